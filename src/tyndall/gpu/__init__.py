@@ -1,0 +1,1 @@
+"""The gpu layer: device, passes, timers, memory ledger, shader linking, parameters. Nothing else imports wgpu."""

@@ -1,0 +1,1 @@
+"""Scenes as plain data, their files, and the bundled ones."""

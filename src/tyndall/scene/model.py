@@ -1,0 +1,358 @@
+"""What a user describes, as plain immutable data.
+
+Units and conventions are glTF's: metres, right-handed, +Y up; a camera looks along its -Z; light is linear with Rec.709
+primaries; directional lights are in lux (illuminance of a surface facing them), point and spot lights in candela.
+Every number is declared once (:func:`tyndall.gpu.params.param`); what is outside its range raises a one-line
+:class:`~tyndall.gpu.params.ParameterError`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tyndall.gpu.params import ParameterError, check, param
+
+Vec2 = tuple[float, float]
+Vec3 = tuple[float, float, float]
+Vec4 = tuple[float, float, float, float]
+Mat4 = tuple[Vec4, Vec4, Vec4, Vec4]
+
+IDENTITY: Mat4 = ((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1))
+
+
+class _Checked:
+    def __post_init__(self) -> None:
+        check(self)
+
+
+# --- phase functions ----------------------------------------------------------------------------------------------
+# cosθ is the angle between the light's direction of travel and the direction towards the viewer; all integrate to 1.
+
+
+@dataclass(frozen=True)
+class Isotropic(_Checked):
+    """p = 1/4π: every direction alike."""
+
+    kind: ClassVar[str] = "isotropic"
+
+
+@dataclass(frozen=True)
+class HenyeyGreenstein(_Checked):
+    """Henyey and Greenstein 1941: p = (1−g²) / (4π (1+g²−2g cosθ)^{3/2})."""
+
+    kind: ClassVar[str] = "henyey_greenstein"
+    g: float = param(0.0, -0.99, 0.99, "mean cosine; > 0 scatters forwards")
+
+
+@dataclass(frozen=True)
+class Rayleigh(_Checked):
+    """Particles much smaller than the wavelength: p = 3/(16π) (1 + cos²θ)."""
+
+    kind: ClassVar[str] = "rayleigh"
+
+
+@dataclass(frozen=True)
+class Gibbons(_Checked):
+    """Gibbons 1958, as Dobashi 2000 uses it: p = K (1 + 9 cos^16(θ/2)), K normalised to 1/(4π·2)."""
+
+    kind: ClassVar[str] = "gibbons"
+
+
+@dataclass(frozen=True)
+class Schlick(_Checked):
+    """Schlick's rational approximation of Henyey–Greenstein: p = (1−k²) / (4π (1−k cosθ)²)."""
+
+    kind: ClassVar[str] = "schlick"
+    k: float = param(0.0, -0.99, 0.99, "eccentricity; k ≈ 1.55 g − 0.55 g³")
+
+
+Phase = Isotropic | HenyeyGreenstein | Rayleigh | Gibbons | Schlick
+
+
+@dataclass(frozen=True)
+class Medium(_Checked):
+    """A homogeneous participating medium, everywhere or inside an axis-aligned box.
+
+    ``extinction`` is scattering + absorption. Light of point and spot lights is attenuated on its way through the medium;
+    a directional light's illuminance is that which arrives in the medium.
+    """
+
+    scattering: Vec3 = param((0.0, 0.0, 0.0), 0, None, "scattering coefficient σs, red, green, blue", unit="1/m")
+    absorption: Vec3 = param((0.0, 0.0, 0.0), 0, None, "absorption coefficient σa, red, green, blue", unit="1/m")
+    phase: Phase = param(Isotropic(), doc="phase function")
+    bounds: tuple[Vec3, Vec3] | None = param(None, doc="lower and upper corner of the medium's box; none: everywhere", unit="m")
+
+    def __post_init__(self) -> None:
+        for name in ("scattering", "absorption"):
+            value = getattr(self, name)
+            if isinstance(value, (int, float, np.number)) and not isinstance(value, bool):
+                object.__setattr__(self, name, (float(value),) * 3)
+        check(self)
+        if self.bounds is not None and not all(a < b for a, b in zip(*self.bounds, strict=True)):
+            raise ParameterError(f"bounds: the upper corner {self.bounds[1]} is not above the lower {self.bounds[0]}")
+
+    @property
+    def extinction(self) -> Vec3:
+        """σt = σs + σa, 1/m."""
+        r, g, b = (s + a for s, a in zip(self.scattering, self.absorption, strict=True))
+        return (r, g, b)
+
+
+# --- lights -------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class DirectionalLight(_Checked):
+    """A light at infinity. ``intensity`` is the illuminance in lux of a surface that faces it."""
+
+    kind: ClassVar[str] = "directional"
+    direction: Vec3 = param((0.0, -1.0, 0.0), doc="direction in which the light travels; any length but zero")
+    intensity: float = param(1.0, 0, None, "illuminance", unit="lx")
+    color: Vec3 = param((1.0, 1.0, 1.0), 0, None, "linear colour, multiplies the intensity")
+
+    def __post_init__(self) -> None:
+        check(self)
+        if not any(self.direction):
+            raise ParameterError("direction: (0, 0, 0) is no direction")
+
+
+@dataclass(frozen=True)
+class PointLight(_Checked):
+    """A light that shines equally in all directions. ``intensity`` is in candela; illuminance falls with 1/r²."""
+
+    kind: ClassVar[str] = "point"
+    position: Vec3 = param((0.0, 0.0, 0.0), doc="position", unit="m")
+    intensity: float = param(1.0, 0, None, "luminous intensity", unit="cd")
+    color: Vec3 = param((1.0, 1.0, 1.0), 0, None, "linear colour, multiplies the intensity")
+
+
+@dataclass(frozen=True)
+class SpotLight(_Checked):
+    """A cone of light, with glTF's falloff (KHR_lights_punctual) between the inner and the outer angle."""
+
+    kind: ClassVar[str] = "spot"
+    position: Vec3 = param((0.0, 0.0, 0.0), doc="position", unit="m")
+    direction: Vec3 = param((0.0, -1.0, 0.0), doc="axis of the cone, as the light travels; any length but zero")
+    intensity: float = param(1.0, 0, None, "luminous intensity", unit="cd")
+    color: Vec3 = param((1.0, 1.0, 1.0), 0, None, "linear colour, multiplies the intensity")
+    inner_angle: float = param(0.0, 0, math.pi / 2, "half angle of the full-intensity cone", unit="rad")
+    outer_angle: float = param(math.pi / 4, 1e-3, 1.5, "half angle of the cone; beyond it is dark", unit="rad")
+
+    def __post_init__(self) -> None:
+        check(self)
+        if not any(self.direction):
+            raise ParameterError("direction: (0, 0, 0) is no direction")
+        if self.inner_angle >= self.outer_angle:
+            raise ParameterError(f"inner_angle: {self.inner_angle:g} is not below outer_angle, {self.outer_angle:g}")
+
+
+Light = DirectionalLight | PointLight | SpotLight
+
+
+# --- geometry -----------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Image:
+    """Texels of a texture: (height, width, 4) uint8, first row at v = 0 (glTF: the top of the image)."""
+
+    pixels: NDArray[np.uint8]
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        p = self.pixels
+        if p.dtype != np.uint8 or p.ndim != 3 or p.shape[2] != 4 or 0 in p.shape:
+            raise ParameterError(f"pixels: {p.dtype} {p.shape} is not uint8 (height, width, 4)")
+
+
+@dataclass(frozen=True)
+class Texture(_Checked):
+    """An image with its sampler and KHR_texture_transform (uv' = translate · rotate · scale · uv)."""
+
+    image: Image = param(..., doc="texels")
+    wrap_u: Literal["repeat", "clamp", "mirror"] = param("repeat", doc="addressing across")
+    wrap_v: Literal["repeat", "clamp", "mirror"] = param("repeat", doc="addressing down")
+    filter: Literal["linear", "nearest"] = param("linear", doc="magnification filter")
+    offset: Vec2 = param((0.0, 0.0), doc="translation of the texture coordinate")
+    rotation: float = param(0.0, doc="counter-clockwise rotation of the texture coordinate", unit="rad")
+    scale: Vec2 = param((1.0, 1.0), doc="scale of the texture coordinate")
+
+
+@dataclass(frozen=True)
+class Material(_Checked):
+    """glTF metallic-roughness. Factors multiply their textures; colour textures are sRGB, the others linear."""
+
+    name: str = param("", doc="name")
+    base_color: Vec4 = param((0.8, 0.8, 0.8, 1.0), 0, 1, "linear albedo (or specular colour of a metal) and alpha")
+    metallic: float = param(0.0, 0, 1, "0 dielectric, 1 metal")
+    roughness: float = param(0.8, 0, 1, "perceptual roughness; α = roughness²")
+    emissive: Vec3 = param((0.0, 0.0, 0.0), 0, None, "emitted radiance, strength included")
+    base_color_texture: Texture | None = param(None, doc="sRGB colour and alpha")
+    metallic_roughness_texture: Texture | None = param(None, doc="roughness in green, metallic in blue")
+    normal_texture: Texture | None = param(None, doc="tangent-space normals")
+    emissive_texture: Texture | None = param(None, doc="sRGB emission")
+    alpha_mode: Literal["opaque", "mask"] = param("opaque", doc="mask: texels below the cutoff are holes")
+    alpha_cutoff: float = param(0.5, 0, 1, "alpha below this is a hole")
+    double_sided: bool = param(False, doc="lit from both sides; no back-face culling")
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Triangles with one material.
+
+    Attributes:
+        positions: (V, 3) float32, metres.
+        indices: (T, 3) uint32, counter-clockwise seen from outside.
+        normals: (V, 3) float32, unit length.
+        uvs: (V, 2) float32 or None.
+        material: how the surface reflects.
+
+    Raises:
+        ParameterError: shapes that do not fit, an index out of range, or a position that is not finite.
+    """
+
+    positions: NDArray[np.float32]
+    indices: NDArray[np.uint32]
+    normals: NDArray[np.float32] | None = None
+    uvs: NDArray[np.float32] | None = None
+    material: Material = Material()
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        def array(name: str, dtype: Any, width: int) -> NDArray[Any]:
+            value = np.ascontiguousarray(getattr(self, name), dtype)
+            if value.ndim != 2 or value.shape[1] != width:
+                raise ParameterError(f"{name}: shape {value.shape} is not (count, {width})")
+            object.__setattr__(self, name, value)
+            return value
+
+        positions = array("positions", np.float32, 3)
+        if len(np.asarray(self.indices)) and np.asarray(self.indices).min() < 0:
+            raise ParameterError("indices: a negative index")
+        indices = array("indices", np.uint32, 3)
+        if not len(positions) or not len(indices):
+            raise ParameterError("positions: a mesh without triangles")
+        if not np.isfinite(positions).all():
+            raise ParameterError("positions: a position is not finite")
+        if indices.max() >= len(positions):
+            raise ParameterError(f"indices: {indices.max()} is beyond the last of {len(positions)} vertices")
+        if self.normals is None:
+            object.__setattr__(self, "normals", vertex_normals(positions, indices))
+        for name, width in (("normals", 3), ("uvs", 2)):
+            if getattr(self, name) is not None and len(array(name, np.float32, width)) != len(positions):
+                raise ParameterError(f"{name}: {len(getattr(self, name))} for {len(positions)} vertices")
+
+    @property
+    def triangle_count(self) -> int:
+        return len(self.indices)
+
+    @cached_property
+    def bounds(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Lower and upper corner, each (3,)."""
+        return self.positions.min(axis=0), self.positions.max(axis=0)
+
+
+def vertex_normals(positions: NDArray[np.float32], indices: NDArray[np.uint32]) -> NDArray[np.float32]:
+    """Area-weighted vertex normals, (V, 3) unit float32; +Y where a vertex has no area around it."""
+    a, b, c = (positions[indices[:, i]] for i in range(3))
+    face = np.cross(b - a, c - a).astype(np.float64)
+    normals = np.stack(
+        [
+            np.bincount(indices.ravel(), np.repeat(face[:, axis], 3), minlength=len(positions))
+            for axis in range(3)
+        ],
+        axis=1,
+    )
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    degenerate = length[:, 0] < 1e-30
+    normals = normals / np.where(length < 1e-30, 1, length)
+    normals[degenerate] = (0, 1, 0)
+    return normals.astype(np.float32)
+
+
+@dataclass(frozen=True, eq=False)
+class Instance:
+    """A mesh placed in the world by a 4×4 matrix (row-major, column vectors: p' = M·p)."""
+
+    mesh: Mesh
+    transform: Mat4 = IDENTITY
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        matrix = np.asarray(self.transform, np.float64)
+        if matrix.shape != (4, 4) or not np.isfinite(matrix).all():
+            raise ParameterError("transform: not 4×4 finite numbers")
+        rows = tuple(tuple(float(x) for x in row) for row in matrix)
+        object.__setattr__(self, "transform", rows)
+
+
+@dataclass(frozen=True)
+class Camera(_Checked):
+    """A pinhole camera with an infinite far plane."""
+
+    position: Vec3 = param((0.0, 1.0, 5.0), doc="position", unit="m")
+    target: Vec3 = param((0.0, 0.0, 0.0), doc="point that is in the middle of the picture", unit="m")
+    up: Vec3 = param((0.0, 1.0, 0.0), doc="direction that is upright in the picture")
+    fov: float = param(math.radians(45), 0.01, 3.1, "vertical field of view", unit="rad")
+    near: float = param(0.01, 1e-6, None, "distance of the near plane", unit="m")
+    exposure: float = param(0.0, -30, 30, "exposure compensation; each step doubles the light", unit="EV")
+
+    def __post_init__(self) -> None:
+        check(self)
+        forward = np.subtract(self.target, self.position)
+        if np.linalg.norm(np.cross(forward, self.up)) <= 1e-9 * np.linalg.norm(forward) * np.linalg.norm(self.up):
+            raise ParameterError("target: the camera looks along its up direction, or nowhere")
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Everything a picture is made of.
+
+    ``looks`` holds, by technique name, the parameters that suit this scene (``{"froxel": {"z_limit": 17.6}}``); a
+    technique made for the scene starts from them.
+    """
+
+    instances: tuple[Instance, ...] = ()
+    lights: tuple[Light, ...] = ()
+    camera: Camera = Camera()
+    medium: Medium = Medium()
+    background: Vec3 = (0.0, 0.0, 0.0)
+    ambient: Vec3 = (0.0, 0.0, 0.0)
+    looks: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    name: str = "scene"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "instances", tuple(self.instances))
+        object.__setattr__(self, "lights", tuple(self.lights))
+
+    @property
+    def triangle_count(self) -> int:
+        """Triangles in the world: an instanced mesh counts once for each instance."""
+        return sum(i.mesh.triangle_count for i in self.instances)
+
+    @cached_property
+    def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Lower and upper corner of the world's axis-aligned box, each (3,); the unit cube around 0 without geometry."""
+        lows, highs = [], []
+        for instance in self.instances:
+            low, high = (c.astype(np.float64) for c in instance.mesh.bounds)
+            corners = np.array([[(low, high)[(i >> axis) & 1][axis] for axis in range(3)] for i in range(8)])
+            matrix = np.asarray(instance.transform)
+            world = corners @ matrix[:3, :3].T + matrix[:3, 3]
+            lows.append(world.min(axis=0))
+            highs.append(world.max(axis=0))
+        if not lows:
+            return np.full(3, -0.5), np.full(3, 0.5)
+        return np.min(lows, axis=0), np.max(highs, axis=0)
+
+    def with_(self, **changes: Any) -> Scene:
+        """A copy with some fields replaced."""
+        return dataclasses.replace(self, **changes)
