@@ -1,13 +1,15 @@
 """One declaration for a parameter.
 
-A technique, a light, a medium is a frozen dataclass whose fields are declared with :func:`param`: default, range, meaning
-and unit in one line. From that line alone come validation, the WESL uniform struct and its bytes (:func:`struct_wesl`,
-:func:`pack`), the CLI flags, the JSON schema and the reference docs.
+A technique, a light, a medium is a frozen dataclass whose fields are declared with :func:`param`: default, range,
+meaning and unit in one line. From that line alone come validation, the WESL uniform struct and its bytes
+(:func:`struct_wesl`, :func:`pack`), the CLI flags, the JSON schema and the reference docs.
 
 >>> @dataclass(frozen=True)
 ... class Fog:
 ...     steps: int = param(64, 1, 4096, "samples along a ray")
 ...     jitter: float = param(0.5, 0, 1, "offset of a sample inside its step", unit="step")
+...     def __post_init__(self) -> None:
+...         check(self)
 >>> Fog(steps=0)
 Traceback (most recent call last):
     ...
@@ -19,15 +21,20 @@ from __future__ import annotations
 import dataclasses
 import difflib
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from types import NoneType, UnionType
-from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import Any, Literal, Union, cast, get_args, get_origin, get_type_hints
 
 import numpy as np
 
 _KEY = "tyndall.param"
+
+
+def _cached[F: Callable[..., Any]](function: F) -> F:
+    """:func:`functools.cache` that keeps the function's signature: mypy does not take a class for hashable."""
+    return cast(F, cache(function))
 
 
 class ParameterError(ValueError):
@@ -73,7 +80,7 @@ def param(
 
 @dataclass(frozen=True)
 class Field:
-    """A declared field of a dataclass: its name, resolved type, default (``MISSING`` if required) and :class:`Param`."""
+    """A declared field: its name, resolved type, default (``MISSING`` if required) and :class:`Param`."""
 
     name: str
     type: Any
@@ -81,14 +88,12 @@ class Field:
     param: Param
 
 
-@cache
+@_cached
 def fields_of(cls: type) -> tuple[Field, ...]:
     """The fields of ``cls`` that were declared with :func:`param`, in order."""
     hints = get_type_hints(cls)
     return tuple(
-        Field(f.name, hints[f.name], f.default, f.metadata[_KEY])
-        for f in dataclasses.fields(cls)
-        if _KEY in f.metadata
+        Field(f.name, hints[f.name], f.default, f.metadata[_KEY]) for f in dataclasses.fields(cls) if _KEY in f.metadata
     )
 
 
@@ -216,10 +221,7 @@ def _numbers(value: Any) -> Iterable[float]:
             yield from _numbers(item)
 
 
-T = TypeVar("T")
-
-
-def replace(instance: T, changes: Mapping[str, Any]) -> T:
+def replace[T](instance: T, changes: Mapping[str, Any]) -> T:
     """A copy of a dataclass with some fields changed; values may be texts, as a command line gives them.
 
     Raises:
@@ -253,7 +255,7 @@ def _wgsl_type(tp: Any) -> tuple[str, str, int, int] | None:
     return None
 
 
-@cache
+@_cached
 def uniform_dtype(cls: type) -> np.dtype[Any]:
     """The numpy layout of ``cls`` in a WGSL uniform buffer (WGSL spec, 14.4.1); a text choice is its index."""
     names, formats, offsets, end = [], [], [], 0
@@ -271,7 +273,7 @@ def uniform_dtype(cls: type) -> np.dtype[Any]:
     return np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": size})
 
 
-@cache
+@_cached
 def struct_wesl(cls: type, name: str = "Params") -> str:
     """The WESL struct of ``cls``, with a constant ``FIELD_CHOICE`` for every text choice."""
     members, constants = [], []

@@ -81,14 +81,16 @@ Phase = Isotropic | HenyeyGreenstein | Rayleigh | Gibbons | Schlick
 class Medium(_Checked):
     """A homogeneous participating medium, everywhere or inside an axis-aligned box.
 
-    ``extinction`` is scattering + absorption. Light of point and spot lights is attenuated on its way through the medium;
-    a directional light's illuminance is that which arrives in the medium.
+    ``extinction`` is scattering + absorption. Light of point and spot lights is attenuated on its way through the
+    medium; a directional light's illuminance is that which arrives in the medium.
     """
 
     scattering: Vec3 = param((0.0, 0.0, 0.0), 0, None, "scattering coefficient σs, red, green, blue", unit="1/m")
     absorption: Vec3 = param((0.0, 0.0, 0.0), 0, None, "absorption coefficient σa, red, green, blue", unit="1/m")
     phase: Phase = param(Isotropic(), doc="phase function")
-    bounds: tuple[Vec3, Vec3] | None = param(None, doc="lower and upper corner of the medium's box; none: everywhere", unit="m")
+    bounds: tuple[Vec3, Vec3] | None = param(
+        None, doc="lower and upper corner of the medium's box; none: everywhere", unit="m"
+    )
 
     def __post_init__(self) -> None:
         for name in ("scattering", "absorption"):
@@ -265,10 +267,7 @@ def vertex_normals(positions: NDArray[np.float32], indices: NDArray[np.uint32]) 
     a, b, c = (positions[indices[:, i]] for i in range(3))
     face = np.cross(b - a, c - a).astype(np.float64)
     normals = np.stack(
-        [
-            np.bincount(indices.ravel(), np.repeat(face[:, axis], 3), minlength=len(positions))
-            for axis in range(3)
-        ],
+        [np.bincount(indices.ravel(), np.repeat(face[:, axis], 3), minlength=len(positions)) for axis in range(3)],
         axis=1,
     )
     length = np.linalg.norm(normals, axis=1, keepdims=True)
@@ -340,7 +339,7 @@ class Scene:
 
     @cached_property
     def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Lower and upper corner of the world's axis-aligned box, each (3,); the unit cube around 0 without geometry."""
+        """Lower and upper corner of the world's box, each (3,); the unit cube around 0 without geometry."""
         lows, highs = [], []
         for instance in self.instances:
             low, high = (c.astype(np.float64) for c in instance.mesh.bounds)
