@@ -1,0 +1,1 @@
+"""Measure, compare and keep: pictures, times, bytes and errors of the techniques."""

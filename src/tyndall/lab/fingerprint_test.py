@@ -1,0 +1,96 @@
+"""The hash follows the content, and only the content."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from tyndall.lab.fingerprint import scene_hash, versions
+from tyndall.scene.model import (
+    Camera,
+    DirectionalLight,
+    HenyeyGreenstein,
+    Image,
+    Instance,
+    Isotropic,
+    Material,
+    Medium,
+    Mesh,
+    Scene,
+    Texture,
+)
+
+
+def triangle(height: float = 1.0, material: Material | None = None) -> Mesh:
+    positions = np.array([[0, 0, 0], [1, 0, 0], [0, height, 0]], np.float32)
+    return Mesh(positions, np.array([[0, 1, 2]], np.uint32), material=material or Material(), name="triangle")
+
+
+def make(**changes: object) -> Scene:
+    base: dict[str, object] = {
+        "instances": (Instance(triangle()),),
+        "lights": (DirectionalLight(intensity=3.0),),
+        "medium": Medium(scattering=(0.1, 0.1, 0.1)),
+    }
+    return Scene(**{**base, **changes})  # type: ignore[arg-type]
+
+
+def test_equal_content_has_one_hash() -> None:
+    assert scene_hash(make()) == scene_hash(make())
+    assert len(scene_hash(make())) == 64
+
+
+def test_names_and_looks_do_not_count() -> None:
+    assert scene_hash(make(name="other", looks={"froxel": {"z_limit": 3.0}})) == scene_hash(make())
+
+
+texels = np.zeros((2, 2, 4), np.uint8)
+textured = Material(base_color_texture=Texture(Image(texels)))
+repainted = Material(base_color_texture=Texture(Image(texels + np.uint8(1))))
+turned = ((0, 0, 1, 0), (0, 1, 0, 0), (-1, 0, 0, 0), (0, 0, 0, 1))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"instances": ()},
+        {"instances": (Instance(triangle(np.nextafter(np.float32(1), np.float32(2)))),)},
+        {"instances": (Instance(triangle(), turned),)},
+        {"instances": (Instance(triangle()), Instance(triangle()))},
+        {"instances": (Instance(triangle(material=textured)),)},
+        {"lights": (DirectionalLight(intensity=3.0000001),)},
+        {"camera": Camera(exposure=1.0)},
+        {"medium": Medium(scattering=(0.1, 0.1, 0.1), phase=HenyeyGreenstein(0.2))},
+        {"medium": Medium(absorption=(0.1, 0.1, 0.1))},
+        {"background": (0.0, 0.0, 0.1)},
+        {"ambient": (0.0, 0.0, 0.1)},
+    ],
+)
+def test_each_part_of_the_content_counts(change: dict[str, object]) -> None:
+    assert scene_hash(make(**change)) != scene_hash(make())
+
+
+def test_texels_count() -> None:
+    first, second = (make(instances=(Instance(triangle(material=m)),)) for m in (textured, repainted))
+    assert scene_hash(first) != scene_hash(second)
+
+
+def test_a_shared_mesh_hashes_like_its_copies() -> None:
+    mesh = triangle()
+    shared = make(instances=(Instance(mesh), Instance(mesh)))
+    copies = make(instances=(Instance(triangle()), Instance(triangle())))
+    assert scene_hash(shared) == scene_hash(copies)
+
+
+def test_a_type_counts_even_where_its_fields_are_equal() -> None:
+    rayleigh = dataclasses.replace(make(), medium=Medium(scattering=(0.1, 0.1, 0.1), phase=HenyeyGreenstein(0.0)))
+    isotropic = dataclasses.replace(make(), medium=Medium(scattering=(0.1, 0.1, 0.1), phase=Isotropic()))
+    assert scene_hash(rayleigh) != scene_hash(isotropic)
+
+
+def test_versions_name_what_is_installed() -> None:
+    found = versions(("numpy", "no-such-package"))
+    assert found["numpy"] == np.__version__
+    assert "no-such-package" not in found
