@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import platform
 import sys
 from collections.abc import Mapping
@@ -11,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
+
+log = logging.getLogger("tyndall")
 
 GET_SOFTWARE = "apt-get install mesa-vulkan-drivers"
 
@@ -128,16 +131,21 @@ def diagnose(adapter: str | None = None) -> Report:
         missing.append(f"wgpu does not load: {str(error).splitlines()[0]}")
     else:
         found = find_adapters()
+        log.disabled = True  # what it would note is among the findings
         try:
             chosen = dict(choose_adapter(adapter).info) if found else None
         except GpuError as error:
             chosen = None
             missing.append(str(error))
+        finally:
+            log.disabled = False
         adapters = tuple(_describe(native, chosen) for native in found)
         if not found:
             missing.append(f"no graphics adapter answers: install your GPU's driver, or {GET_SOFTWARE}")
         elif all(a.kind == "CPU" for a in adapters):
-            missing.append("no GPU answers, so pictures come from the slower software adapter: install its Vulkan driver")
+            missing.append(
+                "no GPU answers, so pictures come from the slower software adapter: install its Vulkan driver"
+            )
         if adapters and not any(a.features["timestamp-query"] for a in adapters):
             missing.append("no adapter has timestamp queries: passes cannot be timed")
     python = f"{platform.python_version()} ({sys.executable})"

@@ -1,0 +1,328 @@
+"""The ``tyndall`` command.
+
+Results go to stdout, progress and notes to stderr; with ``--json``, stdout holds one JSON document and nothing else.
+Exit codes: 0 done, 1 a fault of Tyndall itself, 2 a mistake in what was asked for (one line on stderr says which, and
+nothing is written), 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+from typer.exceptions import TyperException
+
+from tyndall import __version__
+from tyndall.app import arguments, console
+from tyndall.app.arguments import Overrides
+from tyndall.gpu.params import ParameterError, fields_of, nearest
+
+if TYPE_CHECKING:
+    from tyndall.scene.model import Scene
+
+DONE, FAULT, MISTAKE, INTERRUPTED = 0, 1, 2, 130
+
+app = typer.Typer(
+    name="tyndall",
+    help="Volumetric light and shadow techniques side by side, with honest numbers.",
+    epilog="Every parameter of every technique is a flag: --froxel.grid 190,90,128. `tyndall techniques` lists them.",
+    rich_markup_mode="rich",
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    suggest_commands=True,
+)
+bench = typer.Typer(help="Measure the techniques against this project's figures.")
+app.add_typer(bench, name="bench")
+
+SceneName = Annotated[str, typer.Argument(metavar="SCENE", help="A bundled scene, a scene JSON, or a mesh file.")]
+Size = Annotated[str, typer.Option(metavar="WxH", help="Width and height of the picture in pixels.")]
+Shadow = Annotated[str | None, typer.Option(metavar="NAME", help="Shadow technique.")]
+Antialiasing = Annotated[str | None, typer.Option(metavar="NAME", help="Antialiasing technique.")]
+Tonemap = Annotated[str | None, typer.Option(metavar="NAME", help="Tone mapping.")]
+Model = Annotated[
+    Literal["paper", "physical"] | None,
+    typer.Option(help="The equations of the techniques' papers, or single scattering in the scene's medium."),
+]
+Lights = Annotated[
+    int | None, typer.Option(metavar="N", help="Number of lights, for the bundled scenes that place them.")
+]
+AdapterName = Annotated[
+    str | None, typer.Option("--adapter", metavar="NAME", help="Part of an adapter's name; see `tyndall doctor`.")
+]
+Seed = Annotated[int, typer.Option(metavar="N", min=0, help="Seed of everything random.")]
+Out = Annotated[Path | None, typer.Option(metavar="DIR", help="Folder for the results; out/SCENE if not given.")]
+Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on stdout, and nothing else there.")]
+
+
+@app.callback(invoke_without_command=True)
+def _global(
+    version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
+    debug: Annotated[bool, typer.Option("--debug", help="Show where an error came from.")] = False,
+) -> None:
+    if version:
+        print(f"tyndall {__version__}")
+        raise typer.Exit
+
+
+@app.command()
+def render(
+    context: typer.Context,
+    scene: SceneName,
+    *,
+    size: Size = "1280x720",
+    technique: Annotated[str, typer.Option(metavar="NAME", help="Volumetric technique.")] = "froxel",
+    shadow: Shadow = None,
+    antialiasing: Antialiasing = None,
+    tonemap: Tonemap = None,
+    model: Model = None,
+    lights: Lights = None,
+    frames: Annotated[int, typer.Option(min=1, help="Frames to draw; the last is kept.")] = 16,
+    adapter: AdapterName = None,
+    seed: Seed = 0,
+    out: Out = None,
+    as_json: Json = False,
+) -> None:
+    """Draw one picture: a PNG, and an EXR with linear light and depth."""
+    pixels = arguments.parse_size(size)
+    families = _families(volumetric=technique, shadow=shadow, antialiasing=antialiasing, tonemap=tonemap)
+    parameters = _parameters(context, [technique], families, model)
+    with console.Work("loading") as work:
+        described = _open(scene, lights)
+        folder = _folder(out, described)
+        from tyndall.lab.render import render as draw
+
+        work.advance("drawing", 0.1)
+        picture = draw(
+            described, size=pixels, parameters=parameters, frames=frames, adapter=adapter, seed=seed, **families
+        )
+        work.advance("writing", 0.9)
+        folder.mkdir(parents=True, exist_ok=True)
+        files = [picture.save(folder / f"{technique}{suffix}") for suffix in (".png", ".exr")]
+    if as_json:
+        document = {
+            "adapter": picture.metadata["adapter"],
+            "scene": described.name,
+            "triangles": described.triangle_count,
+            "size": list(picture.size),
+            "technique": technique,
+            "image": str(files[0]),
+            "exr": str(files[1]),
+        }
+        print(json.dumps(document, indent=2))
+    else:
+        width, height = picture.size
+        print(f"{files[0]}  ({described.name}, {technique}, {width}×{height}, {picture.metadata['adapter']})")
+        print(files[1])
+
+
+@app.command()
+def compare(
+    context: typer.Context,
+    scene: SceneName,
+    *,
+    size: Size = "1280x720",
+    technique: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAMES", help="Volumetric techniques, separated by commas; all if not given."),
+    ] = None,
+    shadow: Shadow = None,
+    antialiasing: Antialiasing = None,
+    tonemap: Tonemap = None,
+    reference: Annotated[str, typer.Option(metavar="NAME", help="What errors are against; `none` for no errors.")] = (
+        "march"
+    ),
+    model: Model = None,
+    lights: Lights = None,
+    frames: Annotated[int, typer.Option(min=1, help="Frames to measure.")] = 64,
+    warmup: Annotated[int, typer.Option(min=0, help="Frames to draw before measuring.")] = 16,
+    adapter: AdapterName = None,
+    seed: Seed = 0,
+    out: Out = None,
+    as_json: Json = False,
+) -> None:
+    """Light the same view by several techniques: time, memory, and error against a converged reference."""
+    from tyndall.techniques import FAMILIES
+
+    pixels = arguments.parse_size(size)
+    chosen = arguments.split_list(technique or FAMILIES["volumetric"].members)
+    if not chosen:
+        raise ParameterError("--technique: no name is given")
+    against = None if reference == "none" else reference
+    others = _families(shadow=shadow, antialiasing=antialiasing, tonemap=tonemap)
+    for name in (*chosen, *([against] if against else [])):
+        _check_name("volumetric", name)
+    used = list(dict.fromkeys([*chosen, *([against] if against else [])]))
+    parameters = _parameters(context, used, others, model)
+    with console.Work("loading") as work:
+        described = _open(scene, lights)
+        folder = _folder(out, described)
+        from tyndall.lab.compare import compare as measure
+
+        comparison = measure(
+            described,
+            size=pixels,
+            volumetric=chosen,
+            reference=against,
+            parameters=parameters,
+            frames=frames,
+            warmup=warmup,
+            adapter=adapter,
+            seed=seed,
+            progress=work.advance,
+            out=folder,
+            **others,
+        )
+    if as_json:
+        print(json.dumps(comparison.to_json(), indent=2))
+    else:
+        console.print_result(comparison.table())
+        print(f"pictures and results.json are in {folder}")
+
+
+@app.command()
+def scenes(as_json: Json = False) -> None:
+    """List the bundled scenes."""
+    from tyndall.app import catalogue
+
+    listed = catalogue.scenes_json()
+    if as_json:
+        print(json.dumps(listed, indent=2))
+    else:
+        console.print_result(catalogue.scenes_table(listed))
+
+
+@app.command()
+def techniques(
+    name: Annotated[str | None, typer.Argument(metavar="[NAME]", help="A technique or a family; all if none.")] = None,
+    as_json: Json = False,
+) -> None:
+    """List the techniques: what each is for, its paper, and every parameter."""
+    from tyndall.app import catalogue
+
+    found = catalogue.find_techniques(name)
+    if as_json:
+        print(json.dumps([catalogue.technique_json(*pair) for pair in found], indent=2))
+    else:
+        console.print_result(catalogue.techniques_table(found))
+
+
+@app.command()
+def doctor(adapter: AdapterName = None, as_json: Json = False) -> None:
+    """Say what this machine draws with, what is missing, and how to get it."""
+    from tyndall.app.doctor import diagnose
+
+    report = diagnose(adapter)
+    if as_json:
+        print(json.dumps(report.to_json(), indent=2))
+    else:
+        console.print_result(report.table())
+    if not report.can_render:
+        raise typer.Exit(MISTAKE)
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit code.
+
+    Args:
+        words: the arguments after the program's name; ``sys.argv`` if None.
+    """
+    words = list(sys.argv[1:] if words is None else words) or ["--help"]
+    debug = "--debug" in words
+    words = [word for word in words if word != "--debug"]
+    # Without it, Mesa's OpenGL adapter writes a line to stderr each time that adapters are listed.
+    os.environ.setdefault("XDG_RUNTIME_DIR", tempfile.gettempdir())
+    try:
+        rest, flags = arguments.split_flags(words)
+        code = app(rest, prog_name="tyndall", standalone_mode=False, obj=flags)
+        sys.stdout.flush()
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    except Exception as error:
+        if isinstance(error, OSError) and error.errno == errno.EPIPE:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            return FAULT
+        if debug:
+            raise
+        line, code = _explain(error)
+        console.say(line)
+    return code if isinstance(code, int) else DONE
+
+
+def _explain(error: Exception) -> tuple[str, int]:
+    """What to tell a person about an error, and the exit code."""
+    if isinstance(error, TyperException):
+        known = getattr(error, "possibilities", None)
+        if known is not None:
+            return f"no such option {getattr(error, 'option_name', '')}{nearest(error.option_name, known)}", MISTAKE
+        return error.format_message(), MISTAKE
+    # What the project raises on purpose is written for the user.
+    if type(error).__module__.startswith("tyndall."):
+        return str(error), MISTAKE
+    if isinstance(error, MemoryError):
+        return "not enough memory for what was asked", MISTAKE
+    if isinstance(error, OSError) and error.strerror:
+        return f"{error.filename or 'system'}: {error.strerror}", MISTAKE
+    return f"this is a fault in Tyndall: {type(error).__name__}: {error} (--debug shows where)", FAULT
+
+
+def _check_name(family: str, name: str) -> None:
+    from tyndall.techniques import FAMILIES
+
+    members = FAMILIES[family].members
+    if name not in members:
+        hint = nearest(name, members) or f"; there are {', '.join(members)}"
+        raise ParameterError(f"no {family} technique '{name}'{hint}")
+
+
+def _families(**chosen: str | None) -> dict[str, str]:
+    """The chosen technique of each family, for those that were chosen."""
+    given = {family: name.replace("-", "_") for family, name in chosen.items() if name is not None}
+    for family, name in given.items():
+        _check_name(family, name)
+    return given
+
+
+def _parameters(context: typer.Context, volumetric: list[str], others: dict[str, str], model: str | None) -> Overrides:
+    """Parameter values by technique name, from ``--technique.parameter`` flags and ``--model``."""
+    from tyndall.techniques import FAMILIES
+
+    members = {name: member for family in FAMILIES.values() for name, member in family.members.items()}
+    parameters = arguments.convert_flags(context.obj, members)
+    used = {
+        *volumetric,
+        *(others.get(name, family.default) for name, family in FAMILIES.items() if name != "volumetric"),
+    }
+    for name in parameters:
+        if name not in used:
+            raise ParameterError(f"--{name}.{next(iter(parameters[name]))}: '{name}' is not used here; choose it first")
+    if model is not None:
+        switched = [n for n in volumetric if "model" in {f.name for f in fields_of(members[n])}]
+        if not switched:
+            raise ParameterError(f"--model: {', '.join(volumetric)} has one model only")
+        for name in switched:
+            parameters.setdefault(name, {}).setdefault("model", model)
+    return parameters
+
+
+def _open(name: str, lights: int | None) -> Scene:
+    from tyndall.app.scenes import open_scene
+
+    return open_scene(name, lights)
+
+
+def _folder(out: Path | None, scene: Scene) -> Path:
+    """Where results go, checked before the work begins; it is made when there is something to put into it."""
+    folder = out if out is not None else Path("out") / scene.name
+    nearest_existing = next(p for p in (folder, *folder.absolute().parents) if p.exists())
+    if not nearest_existing.is_dir():
+        raise ParameterError(f"--out: {nearest_existing} is a file, not a folder")
+    if not os.access(nearest_existing, os.W_OK):
+        raise ParameterError(f"--out: {nearest_existing} cannot be written to")
+    return folder

@@ -1,0 +1,101 @@
+"""What a person sees while a command runs: results on stdout, everything else on stderr."""
+
+from __future__ import annotations
+
+import logging
+import sys
+import warnings
+from types import TracebackType
+from typing import TYPE_CHECKING, Self
+
+if TYPE_CHECKING:
+    from rich.console import Console, RenderableType
+    from rich.progress import Progress
+
+_WIDE = 150
+
+
+def print_result(renderable: RenderableType | str) -> None:
+    """Print a result on stdout; tables keep their columns where the output is no terminal."""
+    from rich.console import Console
+
+    Console(width=None if sys.stdout.isatty() else _WIDE, highlight=False, soft_wrap=False).print(renderable)
+
+
+def say(line: str) -> None:
+    """One line on stderr."""
+    print(f"tyndall: {line}", file=sys.stderr)
+
+
+class Work:
+    """A piece of work with a progress bar on stderr.
+
+    The project's notes ("drawing with the software adapter …") and warnings are held back until the work has begun to
+    advance, or has ended well: where it fails at once, its error is the only line.
+    """
+
+    def __init__(self, title: str) -> None:
+        self._title = title
+        self._notes: list[str] = []
+        self._begun = False
+        self._progress: Progress | None = None
+
+    def __enter__(self) -> Self:
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+        console = Console(stderr=True)
+        columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:>3.0f} %"))
+        self._progress = Progress(*columns, TimeElapsedColumn(), console=console, transient=True)
+        self._task = self._progress.add_task(self._title, total=1.0)
+        self._console: Console = console
+        self._handler = _Hold(self)
+        self._logger = logging.getLogger("tyndall")
+        self._logger.addHandler(self._handler)
+        self._propagated, self._logger.propagate = self._logger.propagate, False
+        self._warnings = warnings.catch_warnings()
+        self._warnings.__enter__()
+        warnings.showwarning = lambda message, *_, **__: self.note(str(message))
+        if console.is_terminal:
+            self._progress.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        assert self._progress is not None
+        self._progress.stop()
+        self._warnings.__exit__(kind, error, trace)
+        self._logger.removeHandler(self._handler)
+        self._logger.propagate = self._propagated
+        if error is None:
+            self._release()
+
+    def advance(self, stage: str, fraction: float) -> None:
+        """Show that ``stage`` is being worked on, and which fraction of the whole is done."""
+        assert self._progress is not None
+        self._release()
+        self._progress.update(self._task, description=stage, completed=fraction)
+
+    def note(self, line: str) -> None:
+        """Tell something that is no error; now, or when the work has begun."""
+        self._notes.append(line)
+        if self._begun:
+            self._release()
+
+    def _release(self) -> None:
+        self._begun = True
+        for line in dict.fromkeys(self._notes):
+            self._console.print(f"tyndall: {line}", highlight=False, markup=False, soft_wrap=True)
+        self._notes.clear()
+
+
+class _Hold(logging.Handler):
+    """Gives a logger's records to a :class:`Work` as notes."""
+
+    def __init__(self, work: Work) -> None:
+        super().__init__(logging.INFO)
+        self._work = work
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self._work.note(record.getMessage())
