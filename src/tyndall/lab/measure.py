@@ -19,6 +19,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from tyndall.gpu.params import ParameterError
+
 
 class Drawable(Protocol):
     """What :func:`measure` needs of a :class:`tyndall.frame.Renderer`."""
@@ -109,10 +111,10 @@ def measure(
     end near that many seconds on a slow adapter; a fast one never notices. ``progress`` hears a fraction of 1.
 
     Raises:
-        ValueError: fewer than one frame.
+        ParameterError: fewer than one frame.
     """
     if frames < 1:
-        raise ValueError(f"frames: {frames} is fewer than 1")
+        raise ParameterError(f"frames: {frames} is fewer than 1")
     start = time.monotonic()
     total = frames + warmup
 

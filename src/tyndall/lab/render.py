@@ -1,0 +1,50 @@
+"""One picture of a scene."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from tyndall.gpu.device import Gpu
+from tyndall.gpu.params import ParameterError
+from tyndall.lab.picture import Picture
+from tyndall.lab.stage import Overrides, Stage, make
+from tyndall.scene.model import Scene
+
+
+def render(
+    scene: Scene,
+    *,
+    size: tuple[int, int] = (1280, 720),
+    volumetric: Any = "froxel",
+    shadow: Any = None,
+    antialiasing: Any = None,
+    tonemap: Any = None,
+    parameters: Overrides | None = None,
+    frames: int = 16,
+    adapter: str | Gpu | None = None,
+    seed: int = 0,
+) -> Picture:
+    """Draw a scene and return its last frame.
+
+    Args:
+        size: width and height in pixels.
+        volumetric, shadow, antialiasing, tonemap: a technique of each family, by name or ready made; None is the
+            family's default. One made by name starts from the scene's looks.
+        parameters: by technique name, parameters to change: ``{"froxel": {"grid": (190, 90, 128)}}``.
+        frames: how many frames are drawn; temporal antialiasing gathers its samples from them.
+        adapter: part of an adapter's name, or a device to share.
+        seed: of everything random.
+
+    Raises:
+        GpuError: no such adapter, or a size beyond its limits.
+        ParameterError: no such technique or parameter, or a size or number of frames below 1.
+    """
+    if frames < 1:
+        raise ParameterError(f"frames: {frames} is fewer than 1")
+    others = {"shadow": shadow, "antialiasing": antialiasing, "tonemap": tonemap}
+    with Stage(scene, size, parameters=parameters, adapter=adapter, seed=seed, **others) as stage:
+        technique = make("volumetric", volumetric, scene, parameters)
+        with stage.renderer(technique) as renderer:
+            for _ in range(frames):
+                renderer.draw()
+            return stage.picture(renderer, technique.name)

@@ -1,0 +1,128 @@
+"""One scene on one device at one size, to be drawn by one technique after another.
+
+Comparisons must differ in one thing only. A :class:`Stage` keeps the rest: the device with its compiled pipelines, the
+scene, the size, the seed, and the techniques of the other families. :meth:`Stage.still` draws the one frame that errors
+are measured on: no antialiasing, hence no camera jitter, so that pixels of two techniques look along the same rays.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tyndall.frame import Renderer
+from tyndall.gpu.device import Gpu
+from tyndall.lab.picture import Picture
+from tyndall.scene.model import Scene
+from tyndall.techniques import FAMILIES
+
+Overrides = Mapping[str, Mapping[str, Any]]
+
+
+@dataclass(frozen=True)
+class Still:
+    """One frame without antialiasing. ``light`` is ``L_v``, (H, W, 3) float32 linear."""
+
+    picture: Picture
+    light: NDArray[np.float32]
+
+
+def make(family: str, chosen: Any, scene: Scene, overrides: Overrides | None = None) -> Any:
+    """A technique of a family: ``chosen`` by name, ready made, or None for the family's default.
+
+    A technique made by name starts from the scene's looks, then takes ``overrides[name]``.
+    """
+    group = FAMILIES[family]
+    return group.make(chosen if chosen is not None else group.default, scene.looks, overrides or {})
+
+
+def describe(technique: Any) -> dict[str, Any]:
+    """Name and parameters of a technique, as plain data."""
+    values = {f.name: getattr(technique, f.name) for f in dataclasses.fields(technique)}
+    return {"technique": technique.name, **values}
+
+
+class Stage:
+    """See the module.
+
+    Args:
+        adapter: part of an adapter's name, or a device to share; a shared one is left open.
+        shadow, antialiasing, tonemap: techniques by name, ready made, or None for the family's default.
+
+    Raises:
+        GpuError: no such adapter.
+        ParameterError: no such technique or parameter.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        size: tuple[int, int],
+        *,
+        shadow: Any = None,
+        antialiasing: Any = None,
+        tonemap: Any = None,
+        parameters: Overrides | None = None,
+        adapter: str | Gpu | None = None,
+        seed: int = 0,
+    ) -> None:
+        self.scene, self.size, self.seed = scene, size, seed
+        self.shadow = make("shadow", shadow, scene, parameters)
+        self.antialiasing = make("antialiasing", antialiasing, scene, parameters)
+        self.tonemap = make("tonemap", tonemap, scene, parameters)
+        self._owned = not isinstance(adapter, Gpu)
+        self.gpu = adapter if isinstance(adapter, Gpu) else Gpu(adapter)
+
+    @property
+    def adapter(self) -> str:
+        """The adapter's name, as its driver gives it."""
+        return str(self.gpu.adapter_info["device"])
+
+    @property
+    def driver(self) -> str:
+        """The driver and the interface it is reached through."""
+        info = self.gpu.adapter_info
+        return f"{info['description']} ({info['backend_type']})".strip()
+
+    def renderer(self, volumetric: Any, *, still: bool = False) -> Renderer:
+        """A renderer with a volumetric technique; ``still`` leaves antialiasing, and with it the jitter, out."""
+        return Renderer(
+            self.scene,
+            self.size,
+            gpu=self.gpu,
+            volumetric=volumetric,
+            shadow=self.shadow,
+            antialiasing=make("antialiasing", "none", self.scene) if still else self.antialiasing,
+            tonemap=self.tonemap,
+            seed=self.seed,
+        )
+
+    def still(self, volumetric: Any) -> Still:
+        """One frame without antialiasing."""
+        with self.renderer(volumetric, still=True) as renderer:
+            renderer.draw()
+            return Still(self.picture(renderer, volumetric.name), renderer.inscattered())
+
+    def picture(self, renderer: Renderer, technique: str) -> Picture:
+        """The frame that ``renderer`` drew last."""
+        made = {"scene": self.scene.name, "technique": technique, "adapter": self.adapter}
+        return Picture(renderer.picture(), renderer.radiance(), renderer.depth(), made)
+
+    def close(self) -> None:
+        """Free the device, unless it was given."""
+        if self._owned:
+            self.gpu.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
