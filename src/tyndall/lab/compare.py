@@ -3,10 +3,10 @@
 What is compared, and how:
 
 - **Time and memory** are the technique's own (:mod:`tyndall.lab.measure`), in frames with everything switched on.
-- **Error** is that of the in-scattered light ``L_v`` alone, on linear float32, so that a bright base image cannot dilute
-  it (:mod:`tyndall.lab.metrics`). The reference is a ray march against the same shadow maps whose steps were doubled
-  until ``L_v`` changed by less than 0.1 % (:mod:`tyndall.lab.reference`), without jitter. Both are still frames: no
-  antialiasing moves the camera, so equal pixels look along equal rays.
+- **Error** is that of the in-scattered light ``L_v`` alone, on linear float32, so that a bright base image cannot
+  dilute it (:mod:`tyndall.lab.metrics`). The reference is a ray march against the same shadow maps whose steps were
+  doubled until ``L_v`` changed by less than 0.1 % (:mod:`tyndall.lab.reference`), without jitter. Both are still
+  frames: no antialiasing moves the camera, so equal pixels look along equal rays.
 - **PSNR** is that of the two final pictures, tone mapped, of the same still frames.
 
 A technique with ``model="paper"`` follows a document whose light has its own units and is not attenuated; it is held
@@ -47,8 +47,8 @@ if TYPE_CHECKING:
 
 Progress = Callable[[float, str], object]
 
-# On a device that draws a frame in milliseconds none of these is reached; on a software adapter they keep a comparison of
-# five techniques at 640×360 within a minute.
+# On a device that draws a frame in milliseconds none of these is reached; on a software adapter they keep a comparison
+# of five techniques at 640×360 within a minute.
 _MEASURE_BUDGET_S = 3.0
 _REFERENCE_BUDGET_S = 15.0
 _BEAUTY_BUDGET_S = 4.0
@@ -235,7 +235,7 @@ class Comparison:
         }
 
     def save(self, folder: str | os.PathLike[str]) -> Path:
-        """Write a PNG and an EXR of each technique and of the reference, a close-up strip per technique, ``results.json``.
+        """Write a PNG and an EXR of each technique and the reference, close-ups of each technique, ``results.json``.
 
         All files are made in a temporary folder beside ``folder`` first and then moved, ``results.json`` last; other
         files in an existing folder stay as they are. Paths in ``results.json`` are relative to it.
@@ -379,7 +379,7 @@ def compare(
 def choose(
     scene: Scene, volumetric: Sequence[Any] | None, model: str | None, parameters: Overrides | None
 ) -> list[Any]:
-    """The volumetric techniques of a comparison, ready made, "off" first where it takes part.
+    """The volumetric techniques of a comparison, ready made.
 
     Raises:
         ParameterError: an unknown technique, parameter or model.
@@ -442,8 +442,8 @@ def _reference(stage: Stage, name: str, tell: _Telling) -> Reference:
         budget_s=_REFERENCE_BUDGET_S,
         progress=tell.inside,
     )
-    # An antialiased picture takes several frames. Where those of the converged march would take too long, fewer steps do:
-    # nothing is measured on this picture.
+    # An antialiased picture takes several frames. Where those of the converged march would take too long, fewer steps
+    # do: nothing is measured on this picture.
     steps, seconds = found.steps, found.seconds
     while 8 * seconds > _BEAUTY_BUDGET_S and steps > 64:
         steps, seconds = steps // 2, seconds / 2
