@@ -1,10 +1,11 @@
 """A reference that has converged, and says so.
 
-A technique with a number of steps is rendered with ``n``, ``2n``, ``4n`` … steps until doubling changes its in-scattered
-light ``L_v`` by less than a tolerance, measured as :func:`~tyndall.lab.metrics.rel_rmse` of one against the next. For the
-ray march, whose error per ray is of first order in the step wherever the ray crosses a shadow's edge, each doubling halves
-the change; the error that is left is then about as large as the last change. A time budget may end the search early: the
-result says by how much the last doubling changed the light, and whether that is within the tolerance.
+A technique with a number of steps is rendered with ``n``, ``2n``, ``4n`` … steps until doubling changes its in-
+scattered light ``L_v`` by less than a tolerance, measured as :func:`~tyndall.lab.metrics.rel_rmse` of one against
+the next. For the ray march, whose error per ray is of first order in the step wherever the ray crosses a shadow's
+edge, each doubling halves the change; the error that is left is then about as large as the last change. A time
+budget may end the search early: the result says by how much the last doubling changed the light, and whether that
+is within the tolerance.
 """
 
 from __future__ import annotations
