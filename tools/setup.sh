@@ -51,7 +51,7 @@ fi
 
 echo "setup: .venv with Python $version"
 "$python" -m venv --clear .venv
-pip=(.venv/bin/python -m pip --disable-pip-version-check --quiet)
+pip=(.venv/bin/python -m pip --disable-pip-version-check --quiet --quiet)
 "${pip[@]}" install --require-hashes --requirement requirements.lock
 "${pip[@]}" install --no-deps --no-build-isolation --editable .
 

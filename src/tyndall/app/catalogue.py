@@ -42,8 +42,8 @@ def technique_json(family: str, technique: type) -> dict[str, Any]:
         "family": family,
         "name": technique_name(technique),
         "summary": summary(technique),
-        "paper": getattr(technique, "paper", ""),
-        "advice": getattr(technique, "advice", ""),
+        "paper": vars(technique)["paper"],
+        "advice": vars(technique)["advice"],
         "parameters": [
             {
                 "name": f.name,
@@ -77,8 +77,7 @@ def techniques_table(techniques: list[tuple[str, type]]) -> RenderableType:
             parts.append(Text(family, style="bold underline"))
         name = technique_name(technique)
         about = [f"[bold cyan]{name}[/]  {escape(summary(technique))}"]
-        about += [escape(line) for line in (getattr(technique, "advice", ""),) if line]
-        about += [f"[dim]{escape(line)}[/]" for line in (getattr(technique, "paper", ""),) if line]
+        about += [escape(vars(technique)["advice"]), f"[dim]Paper: {escape(vars(technique)['paper'])}[/]"]
         parts.append(Padding(Text.from_markup("\n".join(about)), (0, 0, 0, 2)))
         if fields := fields_of(technique):
             table = Table(box=None, show_header=False, padding=(0, 2, 0, 0))
@@ -115,3 +114,29 @@ def allowed(f: Field) -> str:
     """Type and range of a parameter in words: ``3 whole numbers, 1 … 1024``."""
     ranges = describe_range(f.param)
     return describe_type(f.type) if ranges == "any" else f"{describe_type(f.type)}, {ranges}"
+
+
+def scenes_json() -> list[dict[str, Any]]:
+    """The bundled scenes, as plain data; none of them is built."""
+    from tyndall.scene import bundled
+
+    return [
+        {
+            "name": name,
+            "triangles": bundled.TRIANGLES[name],
+            "summary": summary(make),
+            "lights": "lights" in inspect.signature(make).parameters,
+        }
+        for name, make in bundled.SCENES.items()
+    ]
+
+
+def scenes_table(scenes: list[dict[str, Any]]) -> RenderableType:
+    """One line a scene."""
+    from rich.table import Table
+
+    table = Table("scene", "triangles", "what it is", box=None, padding=(0, 2, 0, 0), header_style="bold")
+    table.columns[1].justify = "right"
+    for scene in scenes:
+        table.add_row(f"[cyan]{scene['name']}[/]", f"{scene['triangles']:,}", scene["summary"])
+    return table

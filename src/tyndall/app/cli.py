@@ -12,9 +12,9 @@ import json
 import os
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import typer
 from typer.exceptions import TyperException
@@ -22,10 +22,8 @@ from typer.exceptions import TyperException
 from tyndall import __version__
 from tyndall.app import arguments, console
 from tyndall.app.arguments import Overrides
+from tyndall.app.scenes import open_scene
 from tyndall.gpu.params import ParameterError, fields_of, nearest
-
-if TYPE_CHECKING:
-    from tyndall.scene.model import Scene
 
 DONE, FAULT, MISTAKE, INTERRUPTED = 0, 1, 2, 130
 
@@ -83,7 +81,7 @@ def render(
     tonemap: Tonemap = None,
     model: Model = None,
     lights: Lights = None,
-    frames: Annotated[int, typer.Option(min=1, help="Frames to draw; the last is kept.")] = 16,
+    frames: Annotated[int, typer.Option(metavar="N", min=1, help="Frames to draw; the last is kept.")] = 16,
     adapter: AdapterName = None,
     seed: Seed = 0,
     out: Out = None,
@@ -91,18 +89,21 @@ def render(
 ) -> None:
     """Draw one picture: a PNG, and an EXR with linear light and depth."""
     pixels = arguments.parse_size(size)
-    families = _families(volumetric=technique, shadow=shadow, antialiasing=antialiasing, tonemap=tonemap)
+    (technique,) = arguments.split_list([technique]) or ("",)
+    families = {"volumetric": technique, **_others(shadow=shadow, antialiasing=antialiasing, tonemap=tonemap)}
     parameters = _parameters(context, [technique], families, model)
     with console.Work("loading") as work:
-        described = _open(scene, lights)
-        folder = _folder(out, described)
+        described = open_scene(scene, lights)
+        folder = out or Path("out", described.name)
+        from tyndall.lab.compare import check_folder
         from tyndall.lab.render import render as draw
 
-        work.advance("drawing", 0.1)
+        check_folder(folder)
+        work.advance(0.1, "drawing")
         picture = draw(
             described, size=pixels, parameters=parameters, frames=frames, adapter=adapter, seed=seed, **families
         )
-        work.advance("writing", 0.9)
+        work.advance(0.9, "saving")
         folder.mkdir(parents=True, exist_ok=True)
         files = [picture.save(folder / f"{technique}{suffix}") for suffix in (".png", ".exr")]
     if as_json:
@@ -135,13 +136,20 @@ def compare(
     shadow: Shadow = None,
     antialiasing: Antialiasing = None,
     tonemap: Tonemap = None,
+    model: Annotated[
+        Literal["paper", "physical", "both"] | None,
+        typer.Option(help="As the techniques' papers have it, or single scattering in the scene's medium, or both."),
+    ] = None,
     reference: Annotated[str, typer.Option(metavar="NAME", help="What errors are against; `none` for no errors.")] = (
         "march"
     ),
-    model: Model = None,
     lights: Lights = None,
-    frames: Annotated[int, typer.Option(min=1, help="Frames to measure.")] = 64,
-    warmup: Annotated[int, typer.Option(min=0, help="Frames to draw before measuring.")] = 16,
+    frames: Annotated[
+        int | None, typer.Option(metavar="N", min=1, help="Frames to measure; 64, or fewer on a slow adapter.")
+    ] = None,
+    warmup: Annotated[
+        int | None, typer.Option(metavar="N", min=0, help="Frames to draw before measuring; 16, or fewer likewise.")
+    ] = None,
     adapter: AdapterName = None,
     seed: Seed = 0,
     out: Out = None,
@@ -151,32 +159,30 @@ def compare(
     from tyndall.techniques import FAMILIES
 
     pixels = arguments.parse_size(size)
-    chosen = arguments.split_list(technique or FAMILIES["volumetric"].members)
-    if not chosen:
+    chosen = arguments.split_list(technique) if technique else None
+    if chosen == []:
         raise ParameterError("--technique: no name is given")
     against = None if reference == "none" else reference
-    others = _families(shadow=shadow, antialiasing=antialiasing, tonemap=tonemap)
-    for name in (*chosen, *([against] if against else [])):
-        _check_name("volumetric", name)
-    used = list(dict.fromkeys([*chosen, *([against] if against else [])]))
-    parameters = _parameters(context, used, others, model)
+    others = _others(shadow=shadow, antialiasing=antialiasing, tonemap=tonemap)
+    parameters = _parameters(context, chosen or list(FAMILIES["volumetric"].members), others)
     with console.Work("loading") as work:
-        described = _open(scene, lights)
-        folder = _folder(out, described)
+        described = open_scene(scene, lights)
+        folder = out or Path("out", described.name)
         from tyndall.lab.compare import compare as measure
 
         comparison = measure(
             described,
             size=pixels,
             volumetric=chosen,
-            reference=against,
+            model=model,
             parameters=parameters,
+            reference=against,
             frames=frames,
             warmup=warmup,
+            out=folder,
             adapter=adapter,
             seed=seed,
             progress=work.advance,
-            out=folder,
             **others,
         )
     if as_json:
@@ -258,9 +264,9 @@ def main(words: Sequence[str] | None = None) -> int:
 def _explain(error: Exception) -> tuple[str, int]:
     """What to tell a person about an error, and the exit code."""
     if isinstance(error, TyperException):
-        known = getattr(error, "possibilities", None)
-        if known is not None:
-            return f"no such option {getattr(error, 'option_name', '')}{nearest(error.option_name, known)}", MISTAKE
+        option, known = getattr(error, "option_name", None), getattr(error, "possibilities", None)
+        if option is not None and hasattr(error, "possibilities"):
+            return f"no such option {option}{nearest(option, known or ())}", MISTAKE
         return error.format_message(), MISTAKE
     # What the project raises on purpose is written for the user.
     if type(error).__module__.startswith("tyndall."):
@@ -272,57 +278,35 @@ def _explain(error: Exception) -> tuple[str, int]:
     return f"this is a fault in Tyndall: {type(error).__name__}: {error} (--debug shows where)", FAULT
 
 
-def _check_name(family: str, name: str) -> None:
-    from tyndall.techniques import FAMILIES
-
-    members = FAMILIES[family].members
-    if name not in members:
-        hint = nearest(name, members) or f"; there are {', '.join(members)}"
-        raise ParameterError(f"no {family} technique '{name}'{hint}")
+def _others(**chosen: str | None) -> dict[str, str]:
+    """The technique of each family, for the families where one was chosen."""
+    return {family: name.replace("-", "_") for family, name in chosen.items() if name is not None}
 
 
-def _families(**chosen: str | None) -> dict[str, str]:
-    """The chosen technique of each family, for those that were chosen."""
-    given = {family: name.replace("-", "_") for family, name in chosen.items() if name is not None}
-    for family, name in given.items():
-        _check_name(family, name)
-    return given
+def _parameters(
+    context: typer.Context, volumetric: list[str], others: Mapping[str, str], model: str | None = None
+) -> Overrides:
+    """Parameter values by technique name, from ``--technique.parameter`` flags and, where it is given, ``--model``.
 
-
-def _parameters(context: typer.Context, volumetric: list[str], others: dict[str, str], model: str | None) -> Overrides:
-    """Parameter values by technique name, from ``--technique.parameter`` flags and ``--model``."""
+    All names and values are tried out here, before a scene is loaded or a device is woken.
+    """
     from tyndall.techniques import FAMILIES
 
     members = {name: member for family in FAMILIES.values() for name, member in family.members.items()}
+    chosen = [("volumetric", name) for name in volumetric]
+    chosen += [(f, others.get(f, family.default)) for f, family in FAMILIES.items() if f != "volumetric"]
+    for family, name in chosen:
+        FAMILIES[family].find(name)
     parameters = arguments.convert_flags(context.obj, members)
-    used = {
-        *volumetric,
-        *(others.get(name, family.default) for name, family in FAMILIES.items() if name != "volumetric"),
-    }
-    for name in parameters:
-        if name not in used:
-            raise ParameterError(f"--{name}.{next(iter(parameters[name]))}: '{name}' is not used here; choose it first")
+    for name, values in parameters.items():
+        if name not in {used for _, used in chosen}:
+            raise ParameterError(
+                f"--{name}.{next(iter(values))}: '{name}' is not drawn here; choose it with its family"
+            )
     if model is not None:
-        switched = [n for n in volumetric if "model" in {f.name for f in fields_of(members[n])}]
+        switched = [name for name in volumetric if any(f.name == "model" for f in fields_of(members[name]))]
         if not switched:
-            raise ParameterError(f"--model: {', '.join(volumetric)} has one model only")
+            raise ParameterError(f"--model: '{volumetric[0]}' has one model only")
         for name in switched:
             parameters.setdefault(name, {}).setdefault("model", model)
     return parameters
-
-
-def _open(name: str, lights: int | None) -> Scene:
-    from tyndall.app.scenes import open_scene
-
-    return open_scene(name, lights)
-
-
-def _folder(out: Path | None, scene: Scene) -> Path:
-    """Where results go, checked before the work begins; it is made when there is something to put into it."""
-    folder = out if out is not None else Path("out") / scene.name
-    nearest_existing = next(p for p in (folder, *folder.absolute().parents) if p.exists())
-    if not nearest_existing.is_dir():
-        raise ParameterError(f"--out: {nearest_existing} is a file, not a folder")
-    if not os.access(nearest_existing, os.W_OK):
-        raise ParameterError(f"--out: {nearest_existing} cannot be written to")
-    return folder

@@ -71,8 +71,8 @@ class Work:
         if error is None:
             self._release()
 
-    def advance(self, stage: str, fraction: float) -> None:
-        """Show that ``stage`` is being worked on, and which fraction of the whole is done."""
+    def advance(self, fraction: float, stage: str) -> None:
+        """Show which fraction of the whole is done, and what is being worked on."""
         assert self._progress is not None
         self._release()
         self._progress.update(self._task, description=stage, completed=fraction)

@@ -1,0 +1,280 @@
+"""Each command of the command line, at tiny sizes; each mistake, with its one line and nothing left behind."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import tyndall
+from tyndall.app.cli import main
+from tyndall.gpu.params import fields_of
+from tyndall.techniques import FAMILIES
+
+TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Commands run in an empty folder."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def run(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, str, str]:
+    """Exit code, stdout and stderr of a command."""
+    code = main(words)
+    out, err = capsys.readouterr()
+    return code, out, err
+
+
+def run_json(capsys: pytest.CaptureFixture[str], *words: str) -> Any:
+    """The JSON document that a command prints; there must be nothing else on stdout."""
+    code, out, err = run(capsys, *words, "--json")
+    assert code == 0, err
+    return json.loads(out)
+
+
+# --- lists --------------------------------------------------------------------------------------------------------
+
+
+def test_no_words_show_the_help(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, _ = run(capsys)
+    assert code == 0
+    assert all(command in out for command in ("render", "compare", "scenes", "techniques", "doctor", "bench"))
+
+
+def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(capsys, "--version") == (0, f"tyndall {tyndall.__version__}\n", "")
+
+
+def test_techniques_lists_every_parameter_of_every_technique(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, _ = run(capsys, "techniques")
+    assert code == 0
+    for family in FAMILIES.values():
+        for name, technique in family.members.items():
+            assert technique.advice.split()[-1] in out
+            for field in fields_of(technique):
+                assert f"--{name}.{field.name}" in out
+
+
+def test_techniques_as_json_can_be_given_back_as_flags(capsys: pytest.CaptureFixture[str]) -> None:
+    listed = run_json(capsys, "techniques")
+    assert {(t["family"], t["name"]) for t in listed} == {
+        (f.name, name) for f in FAMILIES.values() for name in f.members
+    }
+    (froxel,) = run_json(capsys, "techniques", "froxel")
+    grid = next(p for p in froxel["parameters"] if p["name"] == "grid")
+    assert grid["flag"] == "--froxel.grid"
+    assert len(grid["default"]) == 3
+    assert froxel["paper"]
+
+
+def test_techniques_of_a_family(capsys: pytest.CaptureFixture[str]) -> None:
+    assert {t["family"] for t in run_json(capsys, "techniques", "shadow")} == {"shadow"}
+
+
+def test_scenes(capsys: pytest.CaptureFixture[str]) -> None:
+    listed = {scene["name"]: scene["triangles"] for scene in run_json(capsys, "scenes")}
+    assert listed == {"box": 4968, "blinds": 607402, "courtyard": 5608441}
+    code, out, _ = run(capsys, "scenes")
+    assert code == 0
+    assert "5,608,441" in out
+
+
+def test_doctor_finds_an_adapter_to_draw_with(capsys: pytest.CaptureFixture[str]) -> None:
+    report = run_json(capsys, "doctor")
+    assert report["can_render"]
+    assert sum(adapter["chosen"] for adapter in report["adapters"]) == 1
+    assert report["packages"]["wgpu"]
+    code, out, err = run(capsys, "doctor")
+    assert (code, err) == (0, "")
+    assert report["adapters"][0]["name"] in out
+
+
+def test_doctor_fails_where_the_wanted_adapter_is_missing(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, _ = run(capsys, "doctor", "--adapter", "voodoo")
+    assert code == 2
+    assert "no adapter matches 'voodoo'" in out
+    assert "cannot draw" in out
+
+
+# --- pictures -----------------------------------------------------------------------------------------------------
+
+
+def test_render_writes_a_png_and_an_exr(capsys: pytest.CaptureFixture[str], folder: Path) -> None:
+    words = ("render", "box", "--size", "48x27", "--frames", "2", "--froxel.grid", "16,9,8", "--out", "made/here")
+    document = run_json(capsys, *words)
+    assert document["scene"] == "box"
+    assert document["triangles"] == 4968
+    assert document["size"] == [48, 27]
+    pixels = np.asarray(Image.open(folder / document["image"]))
+    assert pixels.shape == (27, 48, 3)
+    assert pixels.std() > 1, "a picture of one colour"
+    assert sorted(p.name for p in (folder / "made/here").iterdir()) == ["froxel.exr", "froxel.png"]
+
+
+def test_the_seed_and_the_parameters_reach_the_picture(capsys: pytest.CaptureFixture[str], folder: Path) -> None:
+    def pixels(*words: str) -> np.ndarray[Any, Any]:
+        document = run_json(capsys, "render", "box", "--size", "32x18", "--frames", "1", *words)
+        return np.asarray(Image.open(folder / document["image"]))
+
+    plain = pixels("--technique", "march", "--march.steps", "8")
+    assert np.array_equal(plain, pixels("--technique", "march", "--march.steps", "8"))
+    assert not np.array_equal(plain, pixels("--technique", "march", "--march.steps=2", "--march.jitter=0"))
+    assert not np.array_equal(plain, pixels("--technique", "off"))
+
+
+def test_compare_prints_the_documented_json_and_fills_a_folder(
+    capsys: pytest.CaptureFixture[str], folder: Path
+) -> None:
+    words = ("compare", "box", "--technique", "off,froxel", "--size", "48x27", "--frames", "1", "--warmup", "0")
+    document = run_json(capsys, *words, "--froxel.grid", "16,9,8", "--out", "result")
+    assert {"adapter", "scene", "triangles", "size", "results"} <= set(document)
+    assert [result["technique"] for result in document["results"]] == ["off", "froxel"]
+    for result in document["results"]:
+        assert {"technique", "model", "gpu_ms", "frame_ms", "memory_bytes", "error", "image"} <= set(result)
+        assert set(result["gpu_ms"]) == {"median", "min", "p95"}
+        assert set(result["error"]) == {"rel_rmse", "psnr", "bias"}
+        assert Image.open(folder / result["image"]).size == (48, 27)
+    off, froxel = document["results"]
+    assert off["error"]["rel_rmse"] > froxel["error"]["rel_rmse"] > 0
+    assert froxel["memory_bytes"] > off["memory_bytes"]
+    kept = json.loads((folder / "result/results.json").read_text())
+    assert kept["scene_hash"]
+    assert kept["parameters"]["volumetric"]["froxel"]["grid"] == [16, 9, 8]
+
+
+def test_compare_prints_a_table(capsys: pytest.CaptureFixture[str]) -> None:
+    words = ("compare", "box", "--technique", "off", "--reference", "none", "--size", "16x9", "--frames", "1")
+    code, out, _ = run(capsys, *words)
+    assert code == 0
+    assert "off" in out
+    assert "out/box" in out
+
+
+def test_a_mesh_file_is_put_on_a_stage(capsys: pytest.CaptureFixture[str], folder: Path) -> None:
+    (folder / "mesh.obj").write_text(TETRAHEDRON)
+    document = run_json(capsys, "render", "mesh.obj", "--size", "32x18", "--frames", "1", "--technique", "march")
+    assert document["triangles"] > 4, "no ground"
+    assert np.asarray(Image.open(folder / document["image"])).std() > 1
+
+
+def test_lights_are_placed_in_a_bundled_scene(capsys: pytest.CaptureFixture[str], folder: Path) -> None:
+    images = [
+        run_json(capsys, "render", "box", "--lights", n, "--size", "16x9", "--frames", "1", "--out", n)["image"]
+        for n in ("1", "3")
+    ]
+    one, three = (np.asarray(Image.open(folder / image)) for image in images)
+    assert not np.array_equal(one, three)
+
+
+# --- mistakes -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("command", "message"),
+    [
+        ("rendr box", "did you mean 'render'?"),
+        ("render", "SCENE"),
+        ("render bocks", "did you mean 'box'?"),
+        ("render nothing.glb", "nothing.glb"),
+        ("render .", "."),
+        ("render box --siez 4x4", "did you mean '--size'?"),
+        ("render box --size", "--size"),
+        ("render box --size 640", "--size: '640' is not WIDTHxHEIGHT"),
+        ("render box --size 0x360", "--size: a picture of 0×360 has no pixels"),
+        ("render box --size 999999x4", "limit"),
+        ("render box --size 16x9 --adapter voodoo", "no adapter matches 'voodoo'"),
+        ("render box --technique froxle", "did you mean 'froxel'?"),
+        ("render box --shadow shadowmap", "did you mean 'shadow_map'?"),
+        ("render box --froxel.gird 1,2,3", "--froxel.gird: 'froxel' has no parameter 'gird' — did you mean 'grid'?"),
+        ("render box --froxle.grid 1,2,3", "did you mean 'froxel'?"),
+        ("render box --froxel.grid 1,2", "--froxel.grid: '1,2' is not 3 whole numbers"),
+        ("render box --froxel.grid 0,2,3", "--froxel.grid: 0 is outside"),
+        ("render box --froxel.grid", "--froxel.grid: needs a value"),
+        ("render box --march.steps 4", "--march.steps: 'march' is not drawn here"),
+        ("render box --technique march --model paper", "--model: 'march' has one model only"),
+        ("render box --model paprika", "'paper'"),
+        ("render box --lights 0", "lights"),
+        ("render box --lights 33", "lights"),
+        ("render box --lights two", "--lights"),
+        ("render box --frames 0", "--frames"),
+        ("render box --out taken/inside", "taken"),
+        ("compare box --technique off,frxel", "did you mean 'froxel'?"),
+        ("compare box --technique ,", "--technique: no name is given"),
+        ("compare box --reference froxel --technique off --size 16x9", "march"),
+        ("compare broken.json", "broken.json"),
+        ("techniques froxl", "did you mean 'froxel'?"),
+        ("doctor --froxel.grid 1,2,3", "--froxel.grid"),
+    ],
+)
+def test_a_mistake_gets_one_line_and_leaves_nothing(
+    command: str, message: str, capsys: pytest.CaptureFixture[str], folder: Path
+) -> None:
+    (folder / "taken").write_text("a file")
+    (folder / "broken.json").write_text('{"camera": 7')
+    code, out, err = run(capsys, *command.split())
+    assert (code, out) == (2, "")
+    assert message in err
+    assert err.startswith("tyndall: ")
+    assert err.count("\n") == 1, err
+    assert sorted(p.name for p in folder.iterdir()) == ["broken.json", "taken"]
+    assert (folder / "taken").read_text() == "a file"
+
+
+def test_debug_shows_where_an_error_came_from() -> None:
+    with pytest.raises(ValueError, match="no scene 'bocks'"):
+        main(["render", "bocks", "--debug"])
+
+
+def test_a_fault_is_not_called_a_mistake(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(_: object) -> None:
+        raise KeyError("lost")
+
+    monkeypatch.setattr("tyndall.app.doctor.diagnose", broken)
+    code, out, err = run(capsys, "doctor")
+    assert (code, out) == (1, "")
+    assert err == "tyndall: this is a fault in Tyndall: KeyError: 'lost' (--debug shows where)\n"
+
+
+def test_what_was_in_the_folder_stays(capsys: pytest.CaptureFixture[str], folder: Path) -> None:
+    (folder / "result").mkdir()
+    (folder / "result/notes.txt").write_text("mine")
+    words = ("compare", "box", "--technique", "off", "--reference", "none", "--size", "16x9", "--frames", "1")
+    assert run(capsys, *words, "--out", "result")[0] == 0
+    assert (folder / "result/notes.txt").read_text() == "mine"
+    assert (folder / "result/off.png").exists()
+
+
+def test_an_interrupt_leaves_no_half_written_file(folder: Path) -> None:
+    words = ("compare", "box", "--size", "320x180", "--frames", "5000", "--out", "result")
+    environment = {**os.environ, "PYTHONUNBUFFERED": "1"}
+    process = subprocess.Popen(
+        [sys.executable, "-m", "tyndall", *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=environment
+    )
+    time.sleep(4)
+    assert process.poll() is None, process.communicate()
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    assert process.returncode == 130, err
+    assert out == b""
+    assert b"Traceback" not in err
+    assert list(folder.iterdir()) == []
+
+
+def test_the_command_is_installed_and_is_a_module() -> None:
+    result = subprocess.run(
+        [sys.executable, "-m", "tyndall", "render", "bocks"], capture_output=True, text=True, check=False
+    )
+    assert result.returncode == 2
+    assert result.stderr.count("\n") == 1
