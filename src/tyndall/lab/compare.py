@@ -41,6 +41,7 @@ from tyndall.lab.reference import Converged, converge
 from tyndall.lab.stage import Overrides, Stage, Still, describe, make
 from tyndall.scene.model import Scene
 from tyndall.techniques import FAMILIES
+from tyndall.techniques.contract import Technique, Unsupported
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -300,10 +301,10 @@ def compare(
     scene: Scene,
     *,
     size: tuple[int, int] = (1280, 720),
-    volumetric: Sequence[Any] | None = None,
-    shadow: Any = None,
-    antialiasing: Any = None,
-    tonemap: Any = None,
+    volumetric: Sequence[str | Technique] | None = None,
+    shadow: str | Technique | None = None,
+    antialiasing: str | Technique | None = None,
+    tonemap: str | Technique | None = None,
     model: str | None = None,
     parameters: Overrides | None = None,
     reference: str | None = "march",
@@ -331,7 +332,8 @@ def compare(
 
     Raises:
         GpuError: no such adapter, or a size beyond its limits.
-        ParameterError: no such technique, model or parameter; a technique asked for by name refuses the scene.
+        ParameterError: no such technique, model or parameter.
+        Unsupported: a technique that was asked for cannot draw this scene.
         OutputError: ``out`` cannot be written.
     """
     for name, value, least in (("frames", frames, 1), ("warmup", warmup, 0)):
@@ -349,7 +351,7 @@ def compare(
             tell.begin(technique.name)
             try:
                 results.append(_one(stage, technique, truth, frames, warmup, tell))
-            except ParameterError as error:
+            except Unsupported as error:
                 if volumetric is not None:
                     raise
                 skipped[technique.name] = str(error)
@@ -377,8 +379,8 @@ def compare(
 
 
 def choose(
-    scene: Scene, volumetric: Sequence[Any] | None, model: str | None, parameters: Overrides | None
-) -> list[Any]:
+    scene: Scene, volumetric: Sequence[str | Technique] | None, model: str | None, parameters: Overrides | None
+) -> list[Technique]:
     """The volumetric techniques of a comparison, ready made.
 
     Raises:
@@ -456,7 +458,7 @@ def _reference(stage: Stage, name: str, tell: _Telling) -> Reference:
 
 
 def _one(
-    stage: Stage, technique: Any, truth: Reference | None, frames: int | None, warmup: int | None, tell: _Telling
+    stage: Stage, technique: Technique, truth: Reference | None, frames: int | None, warmup: int | None, tell: _Telling
 ) -> Result:
     with stage.renderer(technique) as renderer:
         measurement = measure(

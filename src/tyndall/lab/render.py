@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from tyndall.gpu.device import Gpu
 from tyndall.gpu.params import ParameterError
 from tyndall.lab.picture import Picture
 from tyndall.lab.stage import Overrides, Stage, make
 from tyndall.scene.model import Scene
+from tyndall.techniques.contract import Technique
 
 
 def render(
     scene: Scene,
     *,
     size: tuple[int, int] = (1280, 720),
-    volumetric: Any = "froxel",
-    shadow: Any = None,
-    antialiasing: Any = None,
-    tonemap: Any = None,
+    volumetric: str | Technique = "froxel",
+    shadow: str | Technique | None = None,
+    antialiasing: str | Technique | None = None,
+    tonemap: str | Technique | None = None,
     parameters: Overrides | None = None,
     frames: int = 16,
     adapter: str | Gpu | None = None,

@@ -7,7 +7,6 @@ are measured on: no antialiasing, hence no camera jitter, so that pixels of two 
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import TracebackType
@@ -18,9 +17,11 @@ from numpy.typing import NDArray
 
 from tyndall.frame import Renderer
 from tyndall.gpu.device import Gpu
+from tyndall.gpu.params import fields_of
 from tyndall.lab.picture import Picture
 from tyndall.scene.model import Scene
 from tyndall.techniques import FAMILIES
+from tyndall.techniques.contract import Technique
 
 Overrides = Mapping[str, Mapping[str, Any]]
 
@@ -33,18 +34,22 @@ class Still:
     light: NDArray[np.float32]
 
 
-def make(family: str, chosen: Any, scene: Scene, overrides: Overrides | None = None) -> Any:
+def make(family: str, chosen: str | Technique | None, scene: Scene, parameters: Overrides | None = None) -> Technique:
     """A technique of a family: ``chosen`` by name, ready made, or None for the family's default.
 
-    A technique made by name starts from the scene's looks, then takes ``overrides[name]``.
+    One made by name starts from the scene's looks; then ``parameters`` of its name apply.
+
+    Raises:
+        ParameterError: no such technique or parameter.
     """
     group = FAMILIES[family]
-    return group.make(chosen if chosen is not None else group.default, scene.looks, overrides or {})
+    name = chosen.name if isinstance(chosen, Technique) else chosen or group.default
+    return group.make(chosen, scene.looks, (parameters or {}).get(name))
 
 
-def describe(technique: Any) -> dict[str, Any]:
+def describe(technique: Technique) -> dict[str, Any]:
     """Name and parameters of a technique, as plain data."""
-    values = {f.name: getattr(technique, f.name) for f in dataclasses.fields(technique)}
+    values = {f.name: getattr(technique, f.name) for f in fields_of(type(technique))}
     return {"technique": technique.name, **values}
 
 
@@ -65,9 +70,9 @@ class Stage:
         scene: Scene,
         size: tuple[int, int],
         *,
-        shadow: Any = None,
-        antialiasing: Any = None,
-        tonemap: Any = None,
+        shadow: str | Technique | None = None,
+        antialiasing: str | Technique | None = None,
+        tonemap: str | Technique | None = None,
         parameters: Overrides | None = None,
         adapter: str | Gpu | None = None,
         seed: int = 0,
@@ -90,7 +95,7 @@ class Stage:
         info = self.gpu.adapter_info
         return f"{info['description']} ({info['backend_type']})".strip()
 
-    def renderer(self, volumetric: Any, *, still: bool = False) -> Renderer:
+    def renderer(self, volumetric: Technique, *, still: bool = False) -> Renderer:
         """A renderer with a volumetric technique; ``still`` leaves antialiasing, and with it the jitter, out."""
         return Renderer(
             self.scene,
@@ -103,7 +108,7 @@ class Stage:
             seed=self.seed,
         )
 
-    def still(self, volumetric: Any) -> Still:
+    def still(self, volumetric: Technique) -> Still:
         """One frame without antialiasing."""
         with self.renderer(volumetric, still=True) as renderer:
             renderer.draw()
