@@ -274,8 +274,8 @@ def uniform_dtype(cls: type) -> np.dtype[Any]:
 
 
 @_cached
-def struct_wesl(cls: type, name: str = "Params") -> str:
-    """The WESL struct of ``cls``, with a constant ``FIELD_CHOICE`` for every text choice."""
+def struct_wesl(cls: type, name: str) -> str:
+    """The WESL struct of ``cls``, with a constant ``CLASS_FIELD_CHOICE`` for every text choice."""
     members, constants = [], []
     for f in fields_of(cls):
         wgsl = _wgsl_type(f.type)
@@ -284,7 +284,7 @@ def struct_wesl(cls: type, name: str = "Params") -> str:
         members.append(f"    {f.name}: {wgsl[0]},")
         if get_origin(f.type) is Literal:
             constants += [
-                f"const {f.name.upper()}_{choice.upper()} = {i}u;" for i, choice in enumerate(get_args(f.type))
+                f"const {cls.__name__.upper()}_{f.name.upper()}_{choice.upper()} = {i}u;" for i, choice in enumerate(get_args(f.type))
             ]
     if not members:
         members = ["    unused_: u32,"]

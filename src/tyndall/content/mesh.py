@@ -1,0 +1,275 @@
+"""Triangle meshes on the device.
+
+All meshes share one position stream (12 bytes a vertex; all that a solid mesh needs in a shadow map), one attribute stream
+(normal as snorm16, texture coordinate as float32; 16 bytes) and one index buffer; the three are vertex and index buffers,
+so a storage binding's limit does not bound them. Instances of a mesh are one draw. What is drawn is recorded once into
+render bundles and replayed, so a frame's host cost does not grow with the number of meshes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tyndall.gpu.device import Blend, Gpu, Raster
+from tyndall.gpu.resources import Bound, Buffer, Texture
+from tyndall.scene.model import Material, Mesh, Scene
+from tyndall.scene.model import Texture as SceneTexture
+
+MODULE = "package::content::mesh"
+OWNER = "mesh"
+
+GBUFFER_TARGETS: tuple[tuple[str, Blend | None], ...] = (
+    ("rgba16float", None),
+    ("rgba8unorm-srgb", None),
+    ("rgba16float", None),
+    ("rg16float", None),
+)
+DEPTH_FORMAT = "depth32float"
+
+_POSITION = (12, ((0, "float32x3", 0),))
+_ATTRIBUTES = (16, ((1, "snorm16x4", 0), (2, "float32x2", 8)))
+_MAPS = ("base_color", "metallic_roughness", "normal", "emissive")
+_ADDRESS = {"repeat": "repeat", "clamp": "clamp-to-edge", "mirror": "mirror-repeat"}
+
+_GBUFFER = Raster(targets=GBUFFER_TARGETS, depth=DEPTH_FORMAT, vertex_buffers=(_POSITION, _ATTRIBUTES))
+_MASKED_DEPTH = Raster(depth=DEPTH_FORMAT, vertex_buffers=(_POSITION, _ATTRIBUTES))
+_SOLID_DEPTH = Raster(depth=DEPTH_FORMAT, vertex_buffers=(_POSITION,))
+
+
+@dataclass(frozen=True)
+class _Draw:
+    material: Material
+    mirrored: bool
+    first_index: int
+    index_count: int
+    base_vertex: int
+    first_instance: int
+    instance_count: int
+
+
+class Meshes:
+    """The meshes of a scene on the device."""
+
+    def __init__(self, gpu: Gpu, scene: Scene) -> None:
+        self._gpu = gpu
+        self._bundles: dict[Any, Any] = {}
+        self._textures: dict[Any, Texture] = {}
+        self._buffers: list[Buffer] = []
+        self._draws: list[_Draw] = []
+        self._maps: dict[int, dict[str, Bound]] = {}
+        if scene.instances:
+            self._upload(scene)
+
+    def _buffer(self, label: str, data: NDArray[Any] | int, **kwargs: Any) -> Buffer:
+        buffer = self._gpu.buffer(f"mesh.{label}", data, owner=OWNER, **kwargs)
+        self._buffers.append(buffer)
+        return buffer
+
+    def _upload(self, scene: Scene) -> None:
+        gpu = self._gpu
+        groups: dict[tuple[int, bool], list[NDArray[np.float64]]] = {}
+        meshes: dict[int, Mesh] = {}
+        for instance in scene.instances:
+            matrix = np.asarray(instance.transform, np.float64)
+            mirrored = bool(np.linalg.det(matrix[:3, :3]) < 0)
+            meshes[id(instance.mesh)] = instance.mesh
+            groups.setdefault((id(instance.mesh), mirrored), []).append(matrix)
+
+        materials: dict[int, Material] = {}
+        for mesh in meshes.values():
+            materials.setdefault(id(mesh.material), mesh.material)
+        material_index = {key: i for i, key in enumerate(materials)}
+
+        vertex_total = sum(len(m.positions) for m in meshes.values())
+        index_total = sum(m.indices.size for m in meshes.values())
+        self._positions = self._buffer("positions", 12 * vertex_total, usage="vertex")
+        self._attributes = self._buffer("attributes", 16 * vertex_total, usage="vertex")
+        self._indices = self._buffer("indices", 4 * index_total, usage="index")
+        placed: dict[int, tuple[int, int]] = {}
+        vertex = index = 0
+        for key, mesh in meshes.items():
+            gpu.write(self._positions, mesh.positions, 12 * vertex)
+            gpu.write(self._attributes, _attributes(mesh), 16 * vertex)
+            gpu.write(self._indices, mesh.indices, 4 * index)
+            placed[key] = (index, vertex)
+            vertex += len(mesh.positions)
+            index += mesh.indices.size
+
+        count = len(scene.instances)
+        rows = np.zeros(count, gpu.dtype(f"{MODULE}::InstanceData"))
+        first = 0
+        for (key, mirrored), matrices in groups.items():
+            mesh = meshes[key]
+            stop = first + len(matrices)
+            world = np.stack(matrices)
+            rows["world"][first:stop] = world.transpose(0, 2, 1)
+            normal = np.linalg.inv(world[:, :3, :3]) if len(world) else world
+            rows["normal"][first:stop, :, :3] = normal  # columns of the inverse transpose are the inverse's rows
+            rows["material"][first:stop] = material_index[id(mesh.material)]
+            self._draws.append(
+                _Draw(mesh.material, mirrored, placed[key][0], mesh.indices.size, placed[key][1], first, len(matrices))
+            )
+            first = stop
+        self._instances = self._buffer("instances", rows, element=f"{MODULE}::InstanceData")
+        self._materials = self._buffer(
+            "materials", self._pack_materials(list(materials.values())), element=f"{MODULE}::MaterialData"
+        )
+        self._maps = {key: self._bind_maps(material) for key, material in materials.items()}
+
+    def _pack_materials(self, materials: list[Material]) -> NDArray[Any]:
+        rows = np.zeros(len(materials), self._gpu.dtype(f"{MODULE}::MaterialData"))
+        for row, m in zip(rows, materials, strict=True):
+            row["base_color"], row["emissive"] = m.base_color, m.emissive
+            row["metallic"], row["roughness"] = m.metallic, m.roughness
+            row["alpha_cutoff"] = m.alpha_cutoff if m.alpha_mode == "mask" else 0.0
+            row["has_normal_map"] = m.normal_texture is not None
+            for name in _MAPS:
+                row[f"{name}_uv"] = _uv_columns(getattr(m, f"{name}_texture"))
+        return rows
+
+    def _bind_maps(self, material: Material) -> dict[str, Bound]:
+        gpu = self._gpu
+        bound: dict[str, Bound] = {}
+        for name in _MAPS:
+            texture: SceneTexture | None = getattr(material, f"{name}_texture")
+            srgb = name in ("base_color", "emissive")
+            bound[f"{name}_map"] = self._texture(texture, srgb).sampled()
+            bound[f"{name}_sampler"] = (
+                gpu.sampler()
+                if texture is None
+                else gpu.sampler(filter=texture.filter, u=_ADDRESS[texture.wrap_u], v=_ADDRESS[texture.wrap_v])
+            )
+        return bound
+
+    def _texture(self, texture: SceneTexture | None, srgb: bool) -> Texture:
+        key = (None if texture is None else id(texture.image), srgb)
+        if key not in self._textures:
+            pixels = np.full((1, 1, 4), 255, np.uint8) if texture is None else texture.image.pixels
+            label = "white" if texture is None else f"texture {texture.image.name}"
+            levels = _mip_chain(pixels, srgb)
+            format = "rgba8unorm-srgb" if srgb else "rgba8unorm"
+            height, width = pixels.shape[:2]
+            made = self._gpu.texture(
+                f"mesh.{label}", (width, height), format, owner=OWNER, usage="sampled", mips=len(levels)
+            )
+            for mip, level in enumerate(levels):
+                self._gpu.write_texture(made, level, mip=mip)
+            self._textures[key] = made
+        return self._textures[key]
+
+    # --- drawing --------------------------------------------------------------------------------------------------
+
+    def draw_gbuffer(self, native_pass: Any, scope: Mapping[str, Any]) -> None:
+        """Draw into the G-buffer; ``scope`` binds ``camera``."""
+        self._replay(native_pass, "gbuffer", scope, "back")
+
+    def draw_depth(self, native_pass: Any, scope: Mapping[str, Any], cull: Literal["none", "front", "back"]) -> None:
+        """Draw depth from a light; ``scope`` binds ``shadow_layers`` and ``layer``.
+
+        Args:
+            cull: faces to leave out, as the light sees them; double-sided materials are always drawn whole.
+        """
+        self._replay(native_pass, "depth", scope, cull)
+
+    def _replay(self, native_pass: Any, kind: str, scope: Mapping[str, Any], cull: str) -> None:
+        if not self._draws:
+            return
+        names = ("camera",) if kind == "gbuffer" else ("shadow_layers", "layer")
+        bound = {name: scope[name] for name in names}
+        key = (kind, cull, tuple(b.key if isinstance(b, Bound) else id(b) for b in bound.values()))
+        if key not in self._bundles:
+            self._bundles[key] = self._record(kind, bound, cull)
+        native_pass.execute_bundles([self._bundles[key]])
+
+    def _record(self, kind: str, scope: Mapping[str, Any], cull: str) -> Any:
+        gpu = self._gpu
+        base = _GBUFFER if kind == "gbuffer" else _SOLID_DEPTH
+        bundle = gpu.bundle(f"mesh.{kind}", base)
+        bundle.set_index_buffer(self._indices.native, "uint32")
+        bundle.set_vertex_buffer(0, self._positions.native)
+        bundle.set_vertex_buffer(1, self._attributes.native)
+        current: Any = None
+        for draw in self._draws:
+            masked = draw.material.alpha_mode == "mask"
+            faces = "none" if draw.material.double_sided else cull
+            if draw.mirrored:
+                faces = {"none": "none", "front": "back", "back": "front"}[faces]
+            bindings = {
+                **scope,
+                "instances": self._instances,
+                "materials": self._materials,
+                **self._maps[id(draw.material)],
+            }
+            if kind == "gbuffer":
+                state, vertex, fragment = _GBUFFER, "vertex", "fragment"
+            elif masked:
+                state, vertex, fragment = _MASKED_DEPTH, "depth_vertex", "depth_fragment"
+            else:
+                state, vertex, fragment = _SOLID_DEPTH, "solid_depth_vertex", None
+            pipeline, group = gpu.raster(
+                MODULE, replace(state, cull=faces), bindings, vertex=vertex, fragment=fragment
+            )
+            if pipeline is not current:
+                bundle.set_pipeline(pipeline)
+                current = pipeline
+            bundle.set_bind_group(0, group)
+            bundle.draw_indexed(
+                draw.index_count, draw.instance_count, draw.first_index, draw.base_vertex, draw.first_instance
+            )
+        return bundle.finish()
+
+    def close(self) -> None:
+        """Free all device memory."""
+        self._bundles.clear()
+        for resource in (*self._buffers, *self._textures.values()):
+            resource.destroy()
+        self._buffers.clear()
+        self._textures.clear()
+
+
+def _attributes(mesh: Mesh) -> NDArray[Any]:
+    packed = np.zeros(len(mesh.positions), np.dtype([("normal", "<i2", 4), ("uv", "<f4", 2)]))
+    if mesh.normals is not None:
+        np.rint(mesh.normals * 32767, out=packed["normal"][:, :3], casting="unsafe")
+    if mesh.uvs is not None:
+        packed["uv"] = mesh.uvs
+    return packed
+
+
+def _uv_columns(texture: SceneTexture | None) -> NDArray[np.float64]:
+    """KHR_texture_transform as the three columns of a 3×2 matrix: translate · rotate · scale."""
+    if texture is None:
+        return np.array([[1, 0], [0, 1], [0, 0]], np.float64)
+    c, s = math.cos(texture.rotation), math.sin(texture.rotation)
+    sx, sy = texture.scale
+    return np.array([[c * sx, -s * sx], [s * sy, c * sy], texture.offset])
+
+
+_TO_LINEAR = np.where(
+    np.arange(256) / 255 <= 0.04045, np.arange(256) / 255 / 12.92, ((np.arange(256) / 255 + 0.055) / 1.055) ** 2.4
+).astype(np.float32)
+
+
+def _mip_chain(pixels: NDArray[np.uint8], srgb: bool) -> list[NDArray[np.uint8]]:
+    """Box-filtered levels down to 1×1, averaged in linear light; an odd last row or column is dropped."""
+    levels = [np.ascontiguousarray(pixels)]
+    current = pixels.astype(np.float32) / 255
+    if srgb:
+        current[..., :3] = _TO_LINEAR[pixels[..., :3]]
+    while max(current.shape[:2]) > 1:
+        height, width = (max(1, n // 2) for n in current.shape[:2])
+        y = 2 if current.shape[0] > 1 else 1
+        x = 2 if current.shape[1] > 1 else 1
+        current = current[: height * y, : width * x].reshape(height, y, width, x, 4).mean(axis=(1, 3))
+        out = current.copy()
+        if srgb:
+            rgb = out[..., :3]
+            out[..., :3] = np.where(rgb <= 0.0031308, 12.92 * rgb, 1.055 * np.maximum(rgb, 1e-8) ** (1 / 2.4) - 0.055)
+        levels.append(np.rint(out * 255).astype(np.uint8))
+    return levels

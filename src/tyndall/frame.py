@@ -1,0 +1,381 @@
+"""One frame.
+
+::
+
+    content ──▶ G-buffer            content ──from each light──▶ shadows ──▶ visibility
+    G-buffer + lights + visibility ──▶ L_b ──▶ air: L_v, T ──▶ L_b·T + L_v ──▶ antialiasing ──▶ tone map ──▶ picture
+
+:meth:`Renderer.draw` is this diagram as code.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections import defaultdict
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tyndall.content.mesh import DEPTH_FORMAT, GBUFFER_TARGETS, Meshes
+from tyndall.gpu.device import Gpu, GpuError
+from tyndall.gpu.resources import Resource, Texture
+from tyndall.scene.model import (
+    Camera,
+    DirectionalLight,
+    HenyeyGreenstein,
+    Medium,
+    PointLight,
+    Scene,
+    Schlick,
+    SpotLight,
+)
+from tyndall.techniques import FAMILIES, Technique
+from tyndall.techniques.contract import View
+from tyndall.techniques.shadow.shadow_map import first_layers
+
+OWNER = "frame"
+_CAMERA = "package::wesl::camera::Camera"
+_LIGHT = "package::wesl::light::Light"
+_MEDIUM = "package::wesl::medium::Medium"
+_MODULE = "package::frame"
+_PHASES = ("isotropic", "henyey_greenstein", "rayleigh", "gibbons", "schlick")  # as wesl/phase.wesl numbers them
+_KINDS = ("directional", "point", "spot")  # as wesl/light.wesl numbers them
+_UNBOUNDED = 1e10
+
+_IMAGES = {
+    "normal_roughness": GBUFFER_TARGETS[0][0],
+    "albedo_metallic": GBUFFER_TARGETS[1][0],
+    "emissive": GBUFFER_TARGETS[2][0],
+    "velocity": GBUFFER_TARGETS[3][0],
+    "depth": DEPTH_FORMAT,
+    "base": "rgba16float",
+    "inscatter": "rgba32float",
+    "transmittance_map": "rgba16float",
+    "lit": "rgba16float",
+    "picture": "rgba8unorm",
+}
+_TARGETS = ("normal_roughness", "albedo_metallic", "emissive", "velocity")
+
+
+class Renderer:
+    """Draws a scene with one technique of each family.
+
+    Args:
+        scene: what is drawn.
+        size: width and height in pixels.
+        gpu: the device to draw on; the renderer makes its own, and closes it, when none is given.
+        adapter: part of an adapter's name, for a device of its own.
+        volumetric, shadow, antialiasing, tonemap: techniques, by name or as instances; by name they start from the scene's
+            ``looks``.
+        seed: of everything random.
+
+    Raises:
+        GpuError: no adapter, or a size beyond its limits.
+        ParameterError: an unknown technique.
+        Unsupported: the technique cannot draw this scene.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        size: tuple[int, int] = (1280, 720),
+        *,
+        gpu: Gpu | None = None,
+        adapter: str | None = None,
+        volumetric: str | Technique | None = None,
+        shadow: str | Technique | None = None,
+        antialiasing: str | Technique | None = None,
+        tonemap: str | Technique | None = None,
+        seed: int = 0,
+    ) -> None:
+        if min(size) < 1:
+            raise GpuError(f"size: {size[0]}×{size[1]} is not a picture")
+        self.scene, self.size, self.seed = scene, size, seed
+        chosen = {"volumetric": volumetric, "shadow": shadow, "antialiasing": antialiasing, "tonemap": tonemap}
+        techniques = {family: FAMILIES[family].make(name, scene.looks) for family, name in chosen.items()}
+        self._own_gpu = gpu is None
+        self.gpu = gpu or Gpu(adapter)
+        self._views: dict[str, View] = {}
+        self._resources: list[Resource] = []
+        self._images: dict[str, Texture] = {}
+        self._content: list[Meshes] = []
+        self._frame = 0
+        self._history = 0
+        self._previous: NDArray[np.float64] | None = None
+        try:
+            self._setup(techniques)
+        except BaseException:
+            self.close()
+            raise
+
+    def _setup(self, techniques: dict[str, Technique]) -> None:
+        gpu, size = self.gpu, self.size
+        for name, format in _IMAGES.items():
+            drawn = name in _TARGETS or name in ("depth", "inscatter")
+            stored = name not in (*_TARGETS, "depth")
+            usage = " ".join(["sampled", *(["target"] if drawn else []), *(["storage"] if stored else [])])
+            self._images[name] = gpu.texture(f"frame.{name}", size, format, owner=OWNER, usage=usage)
+        black = gpu.texture("frame.black", (1, 1), "rgba32float", owner=OWNER, usage="sampled")
+        gpu.write_texture(black, np.zeros((1, 1, 4), np.float32))
+        self._resources += [*self._images.values(), black]
+        self._content = [Meshes(gpu, self.scene)]
+        self._camera = self._buffer("camera", gpu.dtype(_CAMERA).itemsize, _CAMERA, "uniform")
+        self._medium = self._buffer("medium", gpu.dtype(_MEDIUM).itemsize, _MEDIUM, "uniform")
+        count = max(1, len(self.scene.lights))
+        self._lights = self._buffer("lights", count * gpu.dtype(_LIGHT).itemsize, _LIGHT, "storage")
+        self._scope: dict[str, Any] = {
+            "camera": self._camera.uniform(),
+            "medium": self._medium.uniform(),
+            "lights": self._lights,
+            "black": black,
+            **{name: self._images[name].sampled() for name in _IMAGES if name != "picture"},
+            "inscatter_out": self._images["inscatter"].write(),
+            "transmittance_out": self._images["transmittance_map"].write(),
+        }
+        gpu.write(self._medium, pack_medium(self.scene.medium, gpu.dtype(_MEDIUM)))
+        gpu.write(self._lights, pack_lights(self.scene, gpu.dtype(_LIGHT)))
+        self._previous_camera: Camera | None = None
+        for family, technique in techniques.items():
+            self.use(family, technique)
+
+    def _buffer(self, label: str, size: int, element: str, usage: str) -> Any:
+        buffer = self.gpu.buffer(f"frame.{label}", size, owner=OWNER, element=element, usage=usage)
+        self._resources.append(buffer)
+        return buffer
+
+    def use(self, family: str, technique: str | Technique) -> Technique:
+        """Switch to another technique of a family; the old one's memory is freed."""
+        made = FAMILIES[family].make(technique, self.scene.looks)
+        supports = getattr(made, "supports", None)
+        if supports is not None:
+            supports(self.scene)
+        if family in self._views:
+            self._views.pop(family).close()
+            self.gpu.forget_groups()
+        owner = f"{family}.{made.name}"
+        self._views[family] = View(self.gpu, self.scene, self.size, owner, made, self._images)
+        return made
+
+    def technique(self, family: str) -> Any:
+        """The technique in use."""
+        return self._views[family].technique
+
+    # --- the frame ------------------------------------------------------------------------------------------------
+
+    def draw(self, camera: Camera | None = None, *, jitter: bool = True) -> float:
+        """Record and submit one frame, without waiting for it; returns the host's time in milliseconds.
+
+        Args:
+            camera: in place of the scene's.
+            jitter: False draws through the pixels' centres whatever the antialiasing technique.
+        """
+        begin = time.perf_counter()
+        gpu, images = self.gpu, self._images
+        self._update(camera or self.scene.camera, jitter)
+        scope = self._scope
+
+        targets = [(images[name].view(), (0.0, 0.0, 0.0, 0.0)) for name in _TARGETS]
+        with gpu.render("gbuffer.mesh", targets, (images["depth"].view(), 0.0)) as native:
+            for content in self._content:
+                content.draw_gbuffer(native, scope)
+
+        shadow = self._view("shadow")
+        visibility = self.technique("shadow").render(shadow, self._content)
+        scope = {**scope, **visibility.bindings}
+        overlay = {"package::visibility": visibility.module}
+
+        gpu.compute("lighting", _MODULE, "lighting").bind(scope, lit_out=images["base"].write()).overlay(
+            overlay
+        ).dispatch(*self.size)
+
+        air = self._view("volumetric", scope, overlay)
+        self.technique("volumetric").render(air)
+
+        gpu.compute("composite", _MODULE, "composite").bind(scope, lit_out=images["lit"].write()).overlay(
+            overlay
+        ).dispatch(*self.size)
+
+        smooth = self._view("antialiasing", scope)
+        self._resolved = self.technique("antialiasing").render(smooth, images["lit"])
+
+        self.technique("tonemap").render(self._view("tonemap", scope), self._resolved, images["picture"])
+        gpu.submit()
+        self._frame += 1
+        self._history += 1
+        return (time.perf_counter() - begin) * 1e3
+
+    def _view(self, family: str, scope: dict[str, Any] | None = None, overlay: dict[str, str] | None = None) -> View:
+        view = self._views[family]
+        view.scope, view.overlay, view.frame = scope or self._scope, overlay or {}, self._frame
+        return view
+
+    def _update(self, camera: Camera, jitter: bool) -> None:
+        shift = self.technique("antialiasing").jitter(self._frame) if jitter else (0.0, 0.0)
+        if camera != self._previous_camera:
+            self._history = 0 if self._previous_camera is None else min(self._history, 8)
+            self._previous_camera = camera
+        row = pack_camera(camera, self.scene, self.size, shift, self.gpu.dtype(_CAMERA))
+        still = row["still_view_proj"].copy()
+        row["previous_view_proj"] = still if self._previous is None else self._previous
+        row["frame"], row["seed"], row["history"] = self._frame, self.seed, self._history
+        self._previous = still
+        self.gpu.write(self._camera, row)
+
+    def restart(self) -> None:
+        """Forget temporal history: the next frame is like the first."""
+        self._frame = self._history = 0
+        self._previous = None
+        self._previous_camera = None
+
+    # --- results --------------------------------------------------------------------------------------------------
+
+    def picture(self) -> NDArray[np.uint8]:
+        """(height, width, 3) uint8: the tone-mapped picture."""
+        return np.ascontiguousarray(self.gpu.read_texture(self._images["picture"])[..., :3])
+
+    def radiance(self) -> NDArray[np.float32]:
+        """(height, width, 3) float32: linear light after antialiasing, before exposure and tone mapping."""
+        return np.ascontiguousarray(self.gpu.read_texture(self._resolved)[..., :3].astype(np.float32))
+
+    def base(self) -> NDArray[np.float32]:
+        """(height, width, 3) float32: ``L_b``, the surfaces' light before the air."""
+        return np.ascontiguousarray(self.gpu.read_texture(self._images["base"])[..., :3].astype(np.float32))
+
+    def inscattered(self) -> NDArray[np.float32]:
+        """(height, width, 3) float32: ``L_v``, the light that the air scatters towards the camera."""
+        return np.ascontiguousarray(self.gpu.read_texture(self._images["inscatter"])[..., :3])
+
+    def transmittance(self) -> NDArray[np.float32]:
+        """(height, width, 3) float32 in 0..1: ``T``, what the air lets through."""
+        return np.ascontiguousarray(self.gpu.read_texture(self._images["transmittance_map"])[..., :3].astype(np.float32))
+
+    def depth(self) -> NDArray[np.float32]:
+        """(height, width) float32: metres along the view axis, infinite for the background."""
+        raw = self.gpu.read_texture(self._images["depth"])[..., 0].astype(np.float32)
+        with np.errstate(divide="ignore"):
+            return np.float32(self._previous_camera.near if self._previous_camera else 1) / raw
+
+    def timings(self) -> dict[str, float]:
+        """GPU milliseconds of the last frame by pass name, and "frame" for the whole; waits for it.
+
+        Empty where the adapter has no timers. Passes of one name are added up.
+        """
+        sums: defaultdict[str, float] = defaultdict(float)
+        for label, milliseconds in self.gpu.timings():
+            sums[label] += milliseconds
+        return dict(sums)
+
+    def memory(self) -> dict[str, int]:
+        """Bytes on the device by owner: "frame", "mesh", "shadow.shadow_map", "volumetric.froxel" …"""
+        return self.gpu.ledger.by_owner()
+
+    def close(self) -> None:
+        """Free everything this renderer made."""
+        self.gpu.discard()
+        for view in self._views.values():
+            view.close()
+        for content in self._content:
+            content.close()
+        for resource in self._resources:
+            resource.destroy()
+        self._views.clear()
+        self._content.clear()
+        self._resources.clear()
+        self.gpu.forget_groups()
+        if self._own_gpu:
+            self.gpu.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+# --- packing ------------------------------------------------------------------------------------------------------
+
+
+def view_matrix(camera: Camera) -> NDArray[np.float64]:
+    """World to camera space, 4×4 for column vectors: x right, y up, the camera looks along -z."""
+    position = np.asarray(camera.position)
+    back = position - np.asarray(camera.target)
+    back /= np.linalg.norm(back)
+    right = np.cross(camera.up, back)
+    right /= np.linalg.norm(right)
+    rotation = np.array([right, np.cross(back, right), back])
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = rotation, -rotation @ position
+    return matrix
+
+
+def projection_matrix(camera: Camera, aspect: float, shift: tuple[float, float] = (0.0, 0.0)) -> NDArray[np.float64]:
+    """Camera space to reversed-Z clip space with an infinite far plane; ``shift`` in normalised device coordinates."""
+    f = 1 / math.tan(camera.fov / 2)
+    return np.array([[f / aspect, 0, -shift[0], 0], [0, f, -shift[1], 0], [0, 0, 0, camera.near], [0, 0, -1, 0]])
+
+
+def pack_camera(
+    camera: Camera, scene: Scene, size: tuple[int, int], shift: tuple[float, float], dtype: np.dtype[Any]
+) -> Any:
+    """The camera's uniform. ``shift`` moves the samples by that many pixels (right, down)."""
+    aspect = size[0] / size[1]
+    ndc = (-2 * shift[0] / size[0], 2 * shift[1] / size[1])  # the picture moves against the samples
+    view = view_matrix(camera)
+    tangent = math.tan(camera.fov / 2)
+    row = np.zeros((), dtype)
+    row["view_proj"] = (projection_matrix(camera, aspect, ndc) @ view).T
+    row["still_view_proj"] = (projection_matrix(camera, aspect) @ view).T
+    row["position"], row["near"] = camera.position, camera.near
+    row["right"], row["up"] = view[0, :3] * tangent * aspect, view[1, :3] * tangent
+    row["forward"] = -view[2, :3]
+    row["exposure"] = 2.0**camera.exposure
+    row["light_count"] = len(scene.lights)
+    row["ambient"], row["background"] = scene.ambient, scene.background
+    row["jitter"], row["size"] = ndc, size
+    row["start"], row["reach"] = depth_range(camera, scene)
+    return row
+
+
+def depth_range(camera: Camera, scene: Scene) -> tuple[float, float]:
+    """View depths between which the medium lies: its box, or from the camera to the scene's far side."""
+    low, high = scene.bounds if scene.medium.bounds is None else map(np.asarray, scene.medium.bounds)
+    corners = np.array([[(low, high)[(i >> axis) & 1][axis] for axis in range(3)] for i in range(8)])
+    depth = (corners - np.asarray(camera.position)) @ -view_matrix(camera)[2, :3]
+    start = 0.0 if scene.medium.bounds is None else max(0.0, float(depth.min()))
+    return start, max(float(depth.max()), start + 10 * camera.near)
+
+
+def pack_medium(medium: Medium, dtype: np.dtype[Any]) -> Any:
+    """The medium's uniform."""
+    row = np.zeros((), dtype)
+    row["scattering"], row["extinction"] = medium.scattering, medium.extinction
+    row["phase_kind"] = _PHASES.index(medium.phase.kind)
+    if isinstance(medium.phase, HenyeyGreenstein):
+        row["phase_parameter"] = medium.phase.g
+    elif isinstance(medium.phase, Schlick):
+        row["phase_parameter"] = medium.phase.k
+    row["lower"], row["upper"] = medium.bounds or ((-_UNBOUNDED,) * 3, (_UNBOUNDED,) * 3)
+    return row
+
+
+def pack_lights(scene: Scene, dtype: np.dtype[Any]) -> NDArray[Any]:
+    """The lights' storage buffer, at least one row."""
+    rows = np.zeros(max(1, len(scene.lights)), dtype)
+    for row, light, first in zip(rows, scene.lights, first_layers(scene), strict=False):
+        row["kind"] = _KINDS.index(light.kind)
+        row["intensity"] = np.multiply(light.color, light.intensity)
+        row["first_layer"] = first
+        if isinstance(light, (PointLight, SpotLight)):
+            row["position"] = light.position
+        if isinstance(light, (DirectionalLight, SpotLight)):
+            row["direction"] = np.asarray(light.direction) / np.linalg.norm(light.direction)
+        if isinstance(light, SpotLight):
+            # KHR_lights_punctual: saturate(cos·scale + offset)² falls from the inner to the outer angle.
+            scale = 1 / max(1e-3, math.cos(light.inner_angle) - math.cos(light.outer_angle))
+            row["cone_scale"], row["cone_offset"] = scale, -math.cos(light.outer_angle) * scale
+    return rows

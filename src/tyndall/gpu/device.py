@@ -1,0 +1,732 @@
+"""The device: adapter choice, resources, passes and their times.
+
+A pass is one expression whose name is its label, its timer and its line in every report::
+
+    gpu.compute("volumetric.froxel.scatter", "package::techniques::volumetric::froxel", "scatter")
+        .bind(camera=camera, params=params, scattering=grid.write())
+        .dispatch(190, 90, 128)
+
+``bind`` names what the shader may import from ``package::bindings``; the layout holds what it does import. Pipelines, bind
+groups and layouts are cached, so that the same expression costs little in the next frame. Passes are recorded into one
+encoder until :meth:`Gpu.submit`.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import os
+import sys
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+import wgpu
+from numpy.typing import NDArray
+
+from tyndall.gpu import params as declared
+from tyndall.gpu.resources import (
+    BYTES_PER_TEXEL,
+    Bound,
+    Buffer,
+    Ledger,
+    ParamsBuffer,
+    Resource,
+    Sampler,
+    Slot,
+    Texture,
+    texel_dtype,
+)
+from tyndall.gpu.shader import Linked, Linker, create_module
+
+log = logging.getLogger("tyndall")
+
+_FEATURES = (
+    "timestamp-query",
+    "float32-blendable",
+    "indirect-first-instance",
+    "depth32float-stencil8",
+    "depth-clip-control",
+    "shader-f16",
+    "subgroup",
+)
+_LIMITS = (
+    "max-texture-dimension-2d",
+    "max-texture-dimension-3d",
+    "max-texture-array-layers",
+    "max-storage-buffer-binding-size",
+    "max-buffer-size",
+    "max-sampled-textures-per-shader-stage",
+    "max-storage-textures-per-shader-stage",
+    "max-storage-buffers-per-shader-stage",
+    "max-color-attachment-bytes-per-sample",
+    "max-compute-workgroup-storage-size",
+    "max-compute-invocations-per-workgroup",
+    "max-compute-workgroup-size-x",
+    "max-compute-workgroup-size-y",
+    "max-compute-workgroup-size-z",
+)
+_RANK_TYPE = {"DiscreteGPU": 0, "IntegratedGPU": 1, "VirtualGPU": 2, "Unknown": 3, "CPU": 4}
+_RANK_BACKEND = {"Vulkan": 0, "Metal": 0, "D3D12": 0, "OpenGL": 1}
+_MAX_TIMED_PASSES = 2048
+_UPLOAD_CHUNK = 64 << 20
+
+
+class GpuError(RuntimeError):
+    """No usable adapter, or a request beyond its limits. One line."""
+
+
+def adapters() -> list[wgpu.GPUAdapter]:
+    """All adapters of this machine, best first: discrete, integrated, virtual, software; native interfaces first."""
+    if sys.platform == "linux":
+        # Without a desktop session Mesa's Wayland probe complains on stderr about the missing variable.
+        os.environ.setdefault("XDG_RUNTIME_DIR", tempfile.gettempdir())
+    found = wgpu.gpu.enumerate_adapters_sync()
+    return sorted(
+        found,
+        key=lambda a: (
+            _RANK_TYPE.get(a.info["adapter_type"], 3),
+            _RANK_BACKEND.get(a.info["backend_type"], 2),
+        ),
+    )
+
+
+def choose_adapter(name: str | None = None) -> wgpu.GPUAdapter:
+    """The adapter whose device name or backend contains ``name`` (any case), or else ``$TYNDALL_ADAPTER``, or the best.
+
+    Raises:
+        GpuError: none at all, or none of that name.
+    """
+    found = adapters()
+    if not found:
+        raise GpuError(
+            "no graphics adapter answers; on Debian or Ubuntu, 'apt-get install mesa-vulkan-drivers' gives a software one"
+        )
+    name = name or os.environ.get("TYNDALL_ADAPTER") or None
+    if name is None:
+        best = found[0]
+        if best.info["adapter_type"] == "CPU":
+            log.warning("no GPU found: drawing with the software adapter %s", best.info["device"])
+        return best
+    for adapter in found:
+        info = adapter.info
+        if name.lower() in f"{info['device']} {info['vendor']} {info['backend_type']} {info['adapter_type']}".lower():
+            return adapter
+    known = ", ".join(f"'{a.info['device']}' ({a.info['backend_type']})" for a in found)
+    raise GpuError(f"no adapter matches '{name}'; there are {known}")
+
+
+@dataclass(frozen=True)
+class Blend:
+    """Colour blending of a render target: ``result = source·source_factor (op) destination·destination_factor``."""
+
+    source: str = "one"
+    destination: str = "one"
+    operation: str = "add"
+
+    def state(self) -> dict[str, Any]:
+        part = {"src_factor": self.source, "dst_factor": self.destination, "operation": self.operation}
+        return {"color": part, "alpha": part}
+
+
+ADD = Blend()
+
+
+@dataclass(frozen=True)
+class Raster:
+    """Fixed-function state of a render pipeline.
+
+    Attributes:
+        targets: colour formats with their blending, in order of ``@location``.
+        depth: depth format, or None.
+        depth_compare: reversed-Z draws what is "greater".
+        cull: "none", "front" or "back"; front faces are counter-clockwise.
+        vertex_buffers: per buffer, (stride, ((shader location, format, offset), …)).
+    """
+
+    targets: tuple[tuple[str, Blend | None], ...] = ()
+    depth: str | None = None
+    depth_compare: str = "greater"
+    depth_write: bool = True
+    cull: str = "none"
+    topology: str = "triangle-list"
+    vertex_buffers: tuple[tuple[int, tuple[tuple[int, str, int], ...]], ...] = ()
+
+
+@dataclass
+class _Program:
+    pipeline: Any
+    group_layout: Any
+    used: tuple[tuple[int, str], ...]
+    groups: dict[tuple[int, ...], Any]
+
+
+class Gpu:
+    """A device with its caches, ledger and timers.
+
+    Args:
+        adapter: part of an adapter's name; see :func:`choose_adapter`.
+    """
+
+    def __init__(self, adapter: str | None = None) -> None:
+        native = choose_adapter(adapter)
+        self.adapter = native
+        self.adapter_info: dict[str, Any] = dict(native.info)
+        features = [f for f in _FEATURES if f in native.features]
+        limits = {name: native.limits[name] for name in _LIMITS if native.limits.get(name)}
+        self.device = native.request_device_sync(
+            label="tyndall", required_features=features, required_limits=limits
+        )
+        self.features = frozenset(features)
+        self.limits: Mapping[str, int] = {**native.limits, **limits}
+        self.ledger = Ledger()
+        self.linker = Linker.of_package()
+        self._programs: dict[Any, _Program] = {}
+        self._modules: dict[Any, tuple[Linked, Any]] = {}
+        self._samplers: dict[Any, Sampler] = {}
+        self._constants: dict[int, Buffer] = {}
+        self._encoder: Any = None
+        self._timed = "timestamp-query" in self.features
+        self._labels: list[str] = []
+        if self._timed:
+            self._queries = self.device.create_query_set(type="timestamp", count=2 * _MAX_TIMED_PASSES)
+            usage = wgpu.BufferUsage
+            size = 16 * _MAX_TIMED_PASSES
+            self._resolved = self.device.create_buffer(size=size, usage=usage.QUERY_RESOLVE | usage.COPY_SRC)
+            self._readback = self.device.create_buffer(size=size, usage=usage.COPY_DST | usage.MAP_READ)
+            self._period = _timestamp_period(self.device)
+        self._submitted_labels: list[str] = []
+
+    # --- resources ------------------------------------------------------------------------------------------------
+
+    def texture(
+        self,
+        label: str,
+        size: tuple[int, ...],
+        format: str,
+        *,
+        owner: str,
+        dimension: str = "2d",
+        usage: str = "sampled storage",
+        mips: int = 1,
+        data: NDArray[Any] | None = None,
+    ) -> Texture:
+        """A texture of (width, height), (width, height, layers) or (width, height, depth) texels.
+
+        Args:
+            usage: words of "sampled", "storage", "target"; copies are always allowed.
+            data: texels of the first mip level, C-contiguous, rows first.
+
+        Raises:
+            GpuError: beyond the adapter's limits.
+        """
+        width, height, depth = (*size, 1)[:3] if len(size) == 2 else size
+        limit = self.limits["max-texture-dimension-3d" if dimension == "3d" else "max-texture-dimension-2d"]
+        layers = self.limits["max-texture-array-layers"]
+        if max(width, height) > limit or (dimension == "3d" and depth > limit) or (dimension != "3d" and depth > layers):
+            raise GpuError(f"{label}: {width}×{height}×{depth} texels; this adapter's limit is {limit}")
+        flags = {
+            "sampled": wgpu.TextureUsage.TEXTURE_BINDING,
+            "storage": wgpu.TextureUsage.STORAGE_BINDING,
+            "target": wgpu.TextureUsage.RENDER_ATTACHMENT,
+        }
+        bits = wgpu.TextureUsage.COPY_SRC | wgpu.TextureUsage.COPY_DST
+        for word in usage.split():
+            bits |= flags[word]
+        native = self.device.create_texture(
+            label=label,
+            size=(width, height, depth),
+            format=format,
+            usage=bits,
+            dimension="3d" if dimension == "3d" else "2d",
+            mip_level_count=mips,
+        )
+        bytes_ = 0
+        for level in range(mips):
+            w, h = max(1, width >> level), max(1, height >> level)
+            d = max(1, depth >> level) if dimension == "3d" else depth
+            bytes_ += w * h * d * BYTES_PER_TEXEL[format]
+        texture = Texture(self.ledger, owner, label, bytes_, native)
+        texture.format, texture.size, texture.dimension = format, (width, height, depth), dimension
+        if data is not None:
+            self.write_texture(texture, data)
+        return texture
+
+    def write_texture(self, texture: Texture, data: NDArray[Any], *, mip: int = 0, layer: int = 0) -> None:
+        """Upload the texels of one mip level (of one layer)."""
+        width, height = (max(1, n >> mip) for n in texture.size[:2])
+        depth = max(1, texture.size[2] >> mip) if texture.dimension == "3d" else 1
+        self.device.queue.write_texture(
+            {"texture": texture.native, "mip_level": mip, "origin": (0, 0, layer)},
+            np.ascontiguousarray(data),
+            {"bytes_per_row": width * BYTES_PER_TEXEL[texture.format], "rows_per_image": height},
+            (width, height, depth),
+        )
+
+    def buffer(
+        self,
+        label: str,
+        data: NDArray[Any] | int,
+        *,
+        owner: str,
+        element: str = "u32",
+        usage: str = "storage",
+    ) -> Buffer:
+        """A buffer from an array, or of a number of bytes.
+
+        Args:
+            element: WESL type of an element; a struct's layout is read from its WESL source.
+            usage: words of "storage", "uniform", "vertex", "index", "indirect"; copies are always allowed.
+
+        Raises:
+            GpuError: larger than the adapter allows.
+        """
+        size = data if isinstance(data, int) else data.nbytes
+        size = max(16, -(-size // 4) * 4)
+        if size > self.limits["max-buffer-size"]:
+            raise GpuError(f"{label}: {size} bytes; a buffer of this adapter holds {self.limits['max-buffer-size']}")
+        bits = wgpu.BufferUsage.COPY_SRC | wgpu.BufferUsage.COPY_DST
+        for word in usage.split():
+            bits |= getattr(wgpu.BufferUsage, word.upper())
+        native = self.device.create_buffer(label=label, size=size, usage=bits)
+        result = Buffer(self.ledger, owner, label, size, native)
+        result.element = element
+        if "::" in element:
+            result.dtype = self.linker.dtype(element)
+        if not isinstance(data, int):
+            self.write(result, data)
+        return result
+
+    def write(self, buffer: Buffer | ParamsBuffer, data: NDArray[Any], offset: int = 0) -> None:
+        """Copy an array into a buffer, at a byte offset, before the next submit."""
+        raw = np.ascontiguousarray(data).reshape(-1).view(np.uint8)
+        if len(raw) % 4:
+            raw = np.concatenate([raw, np.zeros(-len(raw) % 4, np.uint8)])
+        for start in range(0, len(raw), _UPLOAD_CHUNK):
+            chunk = raw[start : start + _UPLOAD_CHUNK]
+            self.device.queue.write_buffer(buffer.native, offset + start, chunk)
+            if len(raw) > _UPLOAD_CHUNK:
+                self.device.queue.submit([])
+
+    def dtype(self, struct: str) -> np.dtype[Any]:
+        """The numpy layout of a WESL struct, by its path."""
+        return self.linker.dtype(struct)
+
+    def params(self, label: str, instance: Any, *, owner: str) -> ParamsBuffer:
+        """The uniform buffer of a declared parameter set; shaders see it as the struct that its fields declare."""
+        packed = declared.pack(instance)
+        bits = wgpu.BufferUsage.UNIFORM | wgpu.BufferUsage.COPY_DST
+        native = self.device.create_buffer(label=label, size=packed.nbytes, usage=bits)
+        result = ParamsBuffer(self.ledger, owner, label, packed.nbytes, native)
+        name = f"{type(instance).__name__}Params"
+        slot = ParamsBuffer.slot(name, declared.struct_wesl(type(instance), name))
+        result.bound = Bound(slot, {"buffer": native, "offset": 0, "size": packed.nbytes})
+        self.write(result, packed)
+        return result
+
+    def constant(self, value: int) -> Bound:
+        """A uniform ``u32`` that holds ``value``, for a pass that is repeated with an index."""
+        if value not in self._constants:
+            data = np.array([value, 0, 0, 0], np.uint32)
+            buffer = self.buffer(f"constant {value}", data, owner="constants", element="u32", usage="uniform")
+            self._constants[value] = buffer
+        return self._constants[value].uniform()
+
+    def sampler(
+        self, *, filter: str = "linear", u: str = "clamp-to-edge", v: str = "clamp-to-edge", compare: str | None = None
+    ) -> Bound:
+        """A sampler, or a comparison sampler."""
+        key = (filter, u, v, compare)
+        if key not in self._samplers:
+            descriptor: dict[str, Any] = {
+                "mag_filter": filter,
+                "min_filter": filter,
+                "mipmap_filter": "nearest" if compare else filter,
+                "address_mode_u": u,
+                "address_mode_v": v,
+                "address_mode_w": "clamp-to-edge",
+            }
+            if compare is not None:
+                descriptor["compare"] = compare
+            self._samplers[key] = Sampler(self.device.create_sampler(**descriptor), compare is not None)
+        return self._samplers[key].bound
+
+    def read_texture(self, texture: Texture, *, layer: int | None = None) -> NDArray[Any]:
+        """The texels of the first mip level as (height, width, channels), or (depth, height, width, channels)."""
+        self.submit()
+        width, height, depth = texture.size
+        dtype, channels = texel_dtype(texture.format)
+        row = width * BYTES_PER_TEXEL[texture.format]
+        origin = (0, 0, layer or 0)
+        if layer is not None:
+            depth = 1
+        raw = self.device.queue.read_texture(
+            {"texture": texture.native, "mip_level": 0, "origin": origin},
+            {"bytes_per_row": row, "rows_per_image": height},
+            (width, height, depth),
+        )
+        texels = np.frombuffer(raw, dtype).reshape(depth, height, width, channels)
+        return texels[0] if depth == 1 else texels
+
+    def read_buffer(self, buffer: Buffer) -> NDArray[Any]:
+        """The buffer's elements, with its dtype."""
+        self.submit()
+        return np.frombuffer(self.device.queue.read_buffer(buffer.native), buffer.dtype)
+
+    # --- passes ---------------------------------------------------------------------------------------------------
+
+    @property
+    def encoder(self) -> Any:
+        """The encoder of the passes since the last submit."""
+        if self._encoder is None:
+            self._encoder = self.device.create_command_encoder(label="tyndall")
+            self._labels = []
+        return self._encoder
+
+    def timestamps(self, label: str) -> dict[str, Any] | None:
+        """Timestamp writes for a pass of this name; None where the adapter has no timers or too many passes ran."""
+        if not self._timed or len(self._labels) >= _MAX_TIMED_PASSES:
+            return None
+        slot = 2 * len(self._labels)
+        self._labels.append(label)
+        return {
+            "query_set": self._queries,
+            "beginning_of_pass_write_index": slot,
+            "end_of_pass_write_index": slot + 1,
+        }
+
+    def compute(self, label: str, module: str, entry: str = "main") -> ComputePass:
+        """A compute pass of one dispatch; see the module's docstring."""
+        return ComputePass(self, label, module, entry)
+
+    @contextlib.contextmanager
+    def render(
+        self,
+        label: str,
+        targets: Sequence[tuple[Any, tuple[float, float, float, float] | None]] = (),
+        depth: tuple[Any, float | None] | None = None,
+    ) -> Iterator[Any]:
+        """A render pass on native views. ``None`` as the clear value keeps what is there."""
+        descriptor: dict[str, Any] = {
+            "label": label,
+            "color_attachments": [
+                {
+                    "view": view,
+                    "load_op": "load" if clear is None else "clear",
+                    "store_op": "store",
+                    "clear_value": clear or (0, 0, 0, 0),
+                }
+                for view, clear in targets
+            ],
+        }
+        if depth is not None:
+            view, clear_depth = depth
+            descriptor["depth_stencil_attachment"] = {
+                "view": view,
+                "depth_load_op": "load" if clear_depth is None else "clear",
+                "depth_store_op": "store",
+                "depth_clear_value": clear_depth or 0.0,
+            }
+        encoder = self.encoder
+        if (stamps := self.timestamps(label)) is not None:
+            descriptor["timestamp_writes"] = stamps
+        native = encoder.begin_render_pass(**descriptor)
+        try:
+            yield native
+        finally:
+            native.end()
+
+    def raster(
+        self,
+        module: str,
+        state: Raster,
+        bindings: Mapping[str, Any],
+        *,
+        vertex: str = "vertex",
+        fragment: str | None = "fragment",
+        overlay: Mapping[str, str] | None = None,
+        features: Mapping[str, bool] | None = None,
+    ) -> tuple[Any, Any]:
+        """(pipeline, bind group) for drawing; record them into a render pass or a bundle."""
+        bound = {name: _as_bound(value) for name, value in bindings.items()}
+        entries = (vertex,) if fragment is None else (vertex, fragment)
+        program = self._program(module, entries, bound, overlay or {}, features or {}, state)
+        return program.pipeline, self._group(program, bound)
+
+    def bundle(self, label: str, state: Raster) -> Any:
+        """A render bundle encoder for passes with the formats of ``state``: recorded once, replayed at no host cost."""
+        return self.device.create_render_bundle_encoder(
+            label=label,
+            color_formats=[format for format, _ in state.targets],
+            depth_stencil_format=state.depth,
+        )
+
+    def submit(self) -> None:
+        """Send the recorded passes to the device."""
+        if self._encoder is None:
+            return
+        if self._labels:
+            count = 2 * len(self._labels)
+            self._encoder.resolve_query_set(self._queries, 0, count, self._resolved, 0)
+            self._encoder.copy_buffer_to_buffer(self._resolved, 0, self._readback, 0, 8 * count)
+        self.device.queue.submit([self._encoder.finish()])
+        self._submitted_labels, self._labels, self._encoder = self._labels, [], None
+
+    def discard(self) -> None:
+        """Forget the passes recorded since the last submit."""
+        self._encoder, self._labels = None, []
+
+    def timings(self) -> list[tuple[str, float]]:
+        """(name, milliseconds) of each pass of the last submit, and ("frame", first begin to last end). Waits for it.
+
+        Empty where the adapter has no timestamp queries.
+        """
+        labels = self._submitted_labels
+        if not labels:
+            return []
+        self._readback.map_sync(wgpu.MapMode.READ, 0, 16 * len(labels))
+        raw = np.frombuffer(self._readback.read_mapped(0, 16 * len(labels)), np.uint64).astype(np.float64)
+        self._readback.unmap()
+        stamps = raw.reshape(-1, 2) * self._period * 1e-6
+        times = [(label, float(max(0.0, end - begin))) for label, (begin, end) in zip(labels, stamps, strict=True)]
+        return [*times, ("frame", float(stamps[:, 1].max() - stamps[:, 0].min()))]
+
+    def wait(self) -> None:
+        """Block until the device has finished all submitted work."""
+        self.submit()
+        self.device.queue.on_submitted_work_done_sync()
+
+    # --- pipelines ------------------------------------------------------------------------------------------------
+
+    def _program(
+        self,
+        module: str,
+        entries: tuple[str, ...],
+        bound: Mapping[str, Bound],
+        overlay: Mapping[str, str],
+        features: Mapping[str, bool],
+        state: Raster | None,
+    ) -> _Program:
+        names = tuple(bound)
+        slots = tuple(b.slot for b in bound.values())
+        key = (module, entries, names, slots, tuple(overlay.items()), tuple(features.items()), state)
+        program = self._programs.get(key)
+        if program is None:
+            program = self._programs[key] = self._build(module, entries, names, slots, overlay, features, state)
+        return program
+
+    def _build(
+        self,
+        module: str,
+        entries: tuple[str, ...],
+        names: tuple[str, ...],
+        slots: tuple[Slot, ...],
+        overlay: Mapping[str, str],
+        features: Mapping[str, bool],
+        state: Raster | None,
+    ) -> _Program:
+        text = _bindings_module(names, slots)
+        linked = self.linker.link(module, entries, text, overlay, features)
+        label = f"{module.removeprefix('package::').replace('::', '/')}.{entries[0]}"
+        native = create_module(self.device, self.linker, linked, label)
+        used = tuple((i, names[i]) for i in sorted(linked.used))
+        layout_entries = [slots[i].entry(i) for i, _ in used]
+        if state is not None:
+            stages = wgpu.ShaderStage.VERTEX | wgpu.ShaderStage.FRAGMENT
+            for entry in layout_entries:
+                entry["visibility"] &= stages
+        else:
+            for entry in layout_entries:
+                entry["visibility"] &= wgpu.ShaderStage.COMPUTE
+        group_layout = self.device.create_bind_group_layout(label=label, entries=layout_entries)
+        layout = self.device.create_pipeline_layout(label=label, bind_group_layouts=[group_layout])
+        pipeline: Any
+        if state is None:
+            pipeline = self.device.create_compute_pipeline(
+                label=label, layout=layout, compute={"module": native, "entry_point": entries[0]}
+            )
+        else:
+            pipeline = self.device.create_render_pipeline(**_raster_descriptor(label, layout, native, entries, state))
+        return _Program(pipeline, group_layout, used, {})
+
+    def _group(self, program: _Program, bound: Mapping[str, Bound]) -> Any:
+        key = tuple(bound[name].key for _, name in program.used)
+        group = program.groups.get(key)
+        if group is None:
+            if len(program.groups) > 256:
+                program.groups.clear()
+            group = program.groups[key] = self.device.create_bind_group(
+                layout=program.group_layout,
+                entries=[{"binding": i, "resource": bound[name].native} for i, name in program.used],
+            )
+        return group
+
+    def forget_groups(self) -> None:
+        """Drop cached bind groups, so that destroyed resources are not kept alive by them."""
+        for program in self._programs.values():
+            program.groups.clear()
+
+    # --- life -----------------------------------------------------------------------------------------------------
+
+    def close(self) -> None:
+        """Free everything. The ledger then holds what others forgot to destroy."""
+        self.discard()
+        for buffer in self._constants.values():
+            buffer.destroy()
+        self._constants.clear()
+        self._programs.clear()
+        self._samplers.clear()
+        if self._timed:
+            self._readback.destroy()
+            self._resolved.destroy()
+            self._timed = False
+        self.device.destroy()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+class ComputePass:
+    """A compute pass under construction."""
+
+    def __init__(self, gpu: Gpu, label: str, module: str, entry: str) -> None:
+        self._gpu, self._label, self._module, self._entry = gpu, label, module, entry
+        self._bound: dict[str, Bound] = {}
+        self._overlay: Mapping[str, str] = {}
+        self._features: Mapping[str, bool] = {}
+
+    def bind(self, scope: Mapping[str, Any] | None = None, **resources: Any) -> Self:
+        """Give names to resources: a :class:`Bound`, or a texture (sampled), buffer (read) or parameter buffer."""
+        for name, value in {**(scope or {}), **resources}.items():
+            self._bound[name] = value if type(value) is Bound else _as_bound(value)
+        return self
+
+    def overlay(self, modules: Mapping[str, str]) -> Self:
+        """Let virtual modules stand for real ones: ``{"package::visibility": "package::techniques::…"}``."""
+        self._overlay = modules
+        return self
+
+    def features(self, **switches: bool) -> Self:
+        """Switches for ``@if`` in the shader."""
+        self._features = switches
+        return self
+
+    def dispatch(self, width: int, height: int = 1, depth: int = 1) -> None:
+        """Run one thread for each element of the given size (rounded up to whole workgroups; the shader checks)."""
+        gpu = self._gpu
+        program = gpu._program(self._module, (self._entry,), self._bound, self._overlay, self._features, None)
+        group = gpu._group(program, self._bound)
+        x, y, z = _workgroup(gpu, self._module, self._entry)
+        encoder = gpu.encoder
+        stamps = gpu.timestamps(self._label)
+        native = encoder.begin_compute_pass(label=self._label, **({"timestamp_writes": stamps} if stamps else {}))
+        native.set_pipeline(program.pipeline)
+        native.set_bind_group(0, group)
+        native.dispatch_workgroups(-(-width // x), -(-height // y), -(-depth // z))
+        native.end()
+
+
+_workgroups: dict[tuple[str, str], tuple[int, int, int]] = {}
+
+
+def _workgroup(gpu: Gpu, module: str, entry: str) -> tuple[int, int, int]:
+    key = (module, entry)
+    if key not in _workgroups:
+        _workgroups[key] = gpu.linker.workgroup(module, entry)
+    return _workgroups[key]
+
+
+def _as_bound(value: Any) -> Bound:
+    if isinstance(value, Bound):
+        return value
+    if isinstance(value, Texture):
+        return value.sampled()
+    if isinstance(value, Buffer):
+        return value.read()
+    if isinstance(value, ParamsBuffer):
+        return value.bound
+    raise TypeError(f"{type(value).__name__} cannot be bound")
+
+
+def _bindings_module(names: Sequence[str], slots: Sequence[Slot]) -> str:
+    preambles = list(dict.fromkeys(slot.preamble for slot in slots if slot.preamble))
+    imports = [p for p in preambles if p.startswith("import")]
+    structs = [p for p in preambles if not p.startswith("import")]
+    lines = [
+        f"@group(0) @binding({i}) {slot.declaration.format(name=name)}"
+        for i, (name, slot) in enumerate(zip(names, slots, strict=True))
+    ]
+    return "\n".join([*imports, *structs, *lines, ""])
+
+
+def _raster_descriptor(
+    label: str, layout: Any, module: Any, entries: tuple[str, ...], state: Raster
+) -> dict[str, Any]:
+    descriptor: dict[str, Any] = {
+        "label": label,
+        "layout": layout,
+        "vertex": {
+            "module": module,
+            "entry_point": entries[0],
+            "buffers": [
+                {
+                    "array_stride": stride,
+                    "step_mode": "vertex",
+                    "attributes": [
+                        {"shader_location": location, "format": format, "offset": offset}
+                        for location, format, offset in attributes
+                    ],
+                }
+                for stride, attributes in state.vertex_buffers
+            ],
+        },
+        "primitive": {"topology": state.topology, "cull_mode": state.cull, "front_face": "ccw"},
+    }
+    if len(entries) > 1:
+        descriptor["fragment"] = {
+            "module": module,
+            "entry_point": entries[1],
+            "targets": [
+                {"format": format, **({"blend": blend.state()} if blend else {})} for format, blend in state.targets
+            ],
+        }
+    if state.depth is not None:
+        descriptor["depth_stencil"] = {
+            "format": state.depth,
+            "depth_write_enabled": state.depth_write,
+            "depth_compare": state.depth_compare,
+        }
+    return descriptor
+
+
+def _timestamp_period(device: wgpu.GPUDevice) -> float:
+    """Nanoseconds of one timestamp tick; wgpu-py does not wrap the call, and 1 is what WebGPU promises."""
+    try:
+        from wgpu.backends.wgpu_native import _api as api
+
+        return float(api.libf.wgpuQueueGetTimestampPeriod(device.queue._internal))
+    except (ImportError, AttributeError):
+        return 1.0
+
+
+__all__ = [
+    "ADD",
+    "Blend",
+    "Bound",
+    "Buffer",
+    "Gpu",
+    "GpuError",
+    "Raster",
+    "Resource",
+    "Texture",
+    "adapters",
+    "choose_adapter",
+]

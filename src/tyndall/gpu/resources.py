@@ -1,0 +1,249 @@
+"""Buffers and textures, each counted in the ledger, and how a shader sees them.
+
+A *slot* is what a shader sees of a resource: its WESL declaration and its layout entry, derived from the resource and the
+way it is bound (sampled, written, as uniform …). A *bound* resource is a slot with the native object behind it.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import wgpu
+
+_COMPUTE = wgpu.ShaderStage.COMPUTE
+_ALL = wgpu.ShaderStage.COMPUTE | wgpu.ShaderStage.VERTEX | wgpu.ShaderStage.FRAGMENT
+
+BYTES_PER_TEXEL = {
+    "r8unorm": 1,
+    "rgba8unorm": 4,
+    "rgba8unorm-srgb": 4,
+    "r16float": 2,
+    "rg16float": 4,
+    "rgba16float": 8,
+    "r32float": 4,
+    "rg32float": 8,
+    "rgba32float": 16,
+    "r32uint": 4,
+    "rgba32uint": 16,
+    "depth32float": 4,
+}
+_NUMPY = {
+    "r8unorm": (np.uint8, 1),
+    "rgba8unorm": (np.uint8, 4),
+    "rgba8unorm-srgb": (np.uint8, 4),
+    "r16float": (np.float16, 1),
+    "rg16float": (np.float16, 2),
+    "rgba16float": (np.float16, 4),
+    "r32float": (np.float32, 1),
+    "rg32float": (np.float32, 2),
+    "rgba32float": (np.float32, 4),
+    "r32uint": (np.uint32, 1),
+    "rgba32uint": (np.uint32, 4),
+    "depth32float": (np.float32, 1),
+}
+
+
+def texel_dtype(format: str) -> tuple[Any, int]:
+    """numpy scalar and channel count of a texture format."""
+    return _NUMPY[format]
+
+
+@dataclass(frozen=True)
+class Slot:
+    """How a shader sees a resource. ``declaration`` has ``{name}``; ``preamble`` holds the struct or import it needs."""
+
+    declaration: str
+    layout: tuple[tuple[str, Any], ...]
+    visibility: int
+    preamble: str = ""
+
+    def entry(self, binding: int) -> dict[str, Any]:
+        (kind, items) = self.layout[0]
+        return {"binding": binding, "visibility": self.visibility, kind: dict(items)}
+
+
+_serial = itertools.count()
+
+
+class Bound:
+    """A slot with its native resource. ``key`` is unique while the resource lives, so bind groups can be cached by it."""
+
+    __slots__ = ("key", "native", "slot")
+
+    def __init__(self, slot: Slot, native: Any) -> None:
+        self.slot, self.native, self.key = slot, native, next(_serial)
+
+
+class Ledger:
+    """Bytes by label and owner of everything that lives on the device."""
+
+    def __init__(self) -> None:
+        self._entries: dict[int, tuple[str, str, int]] = {}
+
+    def add(self, serial: int, owner: str, label: str, size: int) -> None:
+        self._entries[serial] = (owner, label, size)
+
+    def remove(self, serial: int) -> None:
+        self._entries.pop(serial, None)
+
+    def __iter__(self) -> Iterator[tuple[str, str, int]]:
+        """(owner, label, bytes) of each resource."""
+        return iter(self._entries.values())
+
+    @property
+    def total(self) -> int:
+        """Bytes of everything."""
+        return sum(size for _, _, size in self._entries.values())
+
+    def by_owner(self) -> dict[str, int]:
+        """Bytes by owner."""
+        totals: Counter[str] = Counter()
+        for owner, _, size in self._entries.values():
+            totals[owner] += size
+        return dict(totals)
+
+
+class Resource:
+    """Something in the ledger that can be destroyed once."""
+
+    def __init__(self, ledger: Ledger, owner: str, label: str, size: int, native: Any) -> None:
+        self.owner, self.label, self.size_bytes, self.native = owner, label, size, native
+        self._ledger, self._serial = ledger, next(_serial)
+        ledger.add(self._serial, owner, label, size)
+
+    def destroy(self) -> None:
+        """Free the device memory and its line in the ledger."""
+        if self.native is not None:
+            self.native.destroy()
+            self._ledger.remove(self._serial)
+            self.native = None
+
+
+def _uniform_slot(struct: str, preamble: str) -> Slot:
+    return Slot(f"var<uniform> {{name}}: {struct};", (("buffer", (("type", "uniform"),)),), _ALL, preamble)
+
+
+class Buffer(Resource):
+    """A device buffer of elements of one WESL type.
+
+    Attributes:
+        element: WESL type of an element: ``f32``, ``vec4f``, or a struct as ``package::wesl::light::Light``.
+        dtype: numpy layout of an element.
+    """
+
+    element: str = "u32"
+    dtype: np.dtype[Any] = np.dtype("<u4")
+
+    def _named(self) -> tuple[str, str]:
+        if "::" in self.element:
+            return self.element.rpartition("::")[2], f"import {self.element};"
+        return self.element, ""
+
+    def _bound(self, declaration: str, kind: str, visibility: int, *, offset: int = 0, size: int | None = None) -> Bound:
+        name, preamble = self._named()
+        slot = Slot(declaration.replace("ELEMENT", name), (("buffer", (("type", kind),)),), visibility, preamble)
+        size = self.size_bytes - offset if size is None else size
+        return Bound(slot, {"buffer": self.native, "offset": offset, "size": size})
+
+    def read(self) -> Bound:
+        """``var<storage, read> name: array<element>``."""
+        return self._cached("read", "var<storage, read> {name}: array<ELEMENT>;", "read-only-storage", _ALL)
+
+    def read_write(self) -> Bound:
+        """``var<storage, read_write> name: array<element>``, in compute only."""
+        return self._cached("rw", "var<storage, read_write> {name}: array<ELEMENT>;", "storage", _COMPUTE)
+
+    def uniform(self, index: int = 0, stride: int = 0) -> Bound:
+        """``var<uniform> name: element``; with ``stride``, the element that begins at byte ``index·stride``."""
+        key = f"uniform{index}"
+        if key not in self._cache:
+            self._cache[key] = self._bound(
+                "var<uniform> {name}: ELEMENT;", "uniform", _ALL, offset=index * stride, size=self.dtype.itemsize
+            )
+        return self._cache[key]
+
+    @property
+    def _cache(self) -> dict[str, Bound]:
+        return self.__dict__.setdefault("_bounds", {})
+
+    def _cached(self, key: str, declaration: str, kind: str, visibility: int) -> Bound:
+        if key not in self._cache:
+            self._cache[key] = self._bound(declaration, kind, visibility)
+        return self._cache[key]
+
+
+class ParamsBuffer(Resource):
+    """The uniform of a dataclass of parameters (:mod:`tyndall.gpu.params`)."""
+
+    bound: Bound
+
+    @staticmethod
+    def slot(name: str, struct: str) -> Slot:
+        return _uniform_slot(name, struct)
+
+
+class Texture(Resource):
+    """A device texture: 2-D, 2-D array (``layers``), 3-D (``depth``) with one mip level unless told otherwise."""
+
+    format: str
+    size: tuple[int, int, int]
+    dimension: str  # "2d", "2d-array" or "3d"
+
+    @property
+    def _cache(self) -> dict[Any, Any]:
+        return self.__dict__.setdefault("_bounds", {})
+
+    def view(self, *, layer: int | None = None) -> Any:
+        """A native view: of everything, or of one layer as 2-D."""
+        key = ("view", layer)
+        if key not in self._cache:
+            if layer is None:
+                self._cache[key] = self.native.create_view(dimension=self.dimension)
+            else:
+                self._cache[key] = self.native.create_view(dimension="2d", base_array_layer=layer, array_layer_count=1)
+        return self._cache[key]
+
+    def sampled(self) -> Bound:
+        """As a sampled texture: ``texture_2d<f32>``, ``texture_3d<f32>``, ``texture_depth_2d_array`` …"""
+        if "sampled" not in self._cache:
+            suffix = self.dimension.replace("-", "_")
+            depth = self.format.startswith("depth")
+            scalar = "u32" if self.format.endswith("uint") else "f32"
+            wesl = f"texture_depth_{suffix}" if depth else f"texture_{suffix}<{scalar}>"
+            kind = "depth" if depth else "uint" if scalar == "u32" else "float"
+            if self.format in ("r32float", "rg32float", "rgba32float"):
+                kind = "unfilterable-float"
+            layout = (("texture", (("sample_type", kind), ("view_dimension", self.dimension))),)
+            self._cache["sampled"] = Bound(Slot(f"var {{name}}: {wesl};", layout, _ALL), self.view())
+        return self._cache["sampled"]
+
+    def write(self) -> Bound:
+        """As a write-only storage texture, in compute only."""
+        return self._storage("write", "write-only")
+
+    def read_write(self) -> Bound:
+        """As a read-write storage texture (r32float, r32uint and r32sint only, by WebGPU), in compute only."""
+        return self._storage("read_write", "read-write")
+
+    def _storage(self, wesl: str, access: str) -> Bound:
+        if wesl not in self._cache:
+            layout = (
+                ("storage_texture", (("access", access), ("format", self.format), ("view_dimension", self.dimension))),
+            )
+            declaration = f"var {{name}}: texture_storage_{self.dimension.replace('-', '_')}<{self.format}, {wesl}>;"
+            self._cache[wesl] = Bound(Slot(declaration, layout, _COMPUTE), self.view())
+        return self._cache[wesl]
+
+
+class Sampler:
+    """Not in the ledger: samplers take no memory."""
+
+    def __init__(self, native: Any, comparison: bool) -> None:
+        kind = "comparison" if comparison else "filtering"
+        wesl = "sampler_comparison" if comparison else "sampler"
+        self.bound = Bound(Slot(f"var {{name}}: {wesl};", (("sampler", (("type", kind),)),), _ALL), native)

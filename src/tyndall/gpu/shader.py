@@ -1,0 +1,189 @@
+"""WESL modules, linked at run time into WGSL (https://wesl-lang.dev; the linker is wesl-py).
+
+Every ``*.wesl`` file of the package is a module, named by its path: ``techniques/volumetric/froxel.wesl`` is
+``package::techniques::volumetric::froxel``. Two kinds of modules are virtual:
+
+- ``package::bindings`` declares what the host bound to the pass, by name. Shaders import the names they use; binding
+  numbers, group layouts and structs of parameters are generated from what was bound.
+- an *overlay* gives a module a second name, so that a shader can import ``package::visibility`` without knowing which
+  shadow technique stands behind it.
+
+Errors of the linker and of the driver are reported with file, line and column of the WESL source.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from importlib.resources import files
+from typing import Any
+
+import numpy as np
+import wesl
+import wgpu
+
+_BINDINGS = "package::bindings"
+_USED = re.compile(r"@group\(0\)\s*@binding\((\d+)\)")
+_VIRTUAL_IMPORT = re.compile(r"import\s+(package::(?:bindings|visibility))::(\{[^}]*\}|\w+)\s*;")
+_ATTRIBUTE = re.compile(r"@\w+(?:\([^)]*\))?\s*")
+_DECLARATION = re.compile(r"(?:fn|struct|const|override|var(?:<[^>]*>)?)\s+(\w+)")
+_DRIVER_POSITION = re.compile(r"wgsl:(\d+):(\d+)")
+
+
+class ShaderError(RuntimeError):
+    """A shader that does not link or validate; the message starts with ``file:line:column``."""
+
+
+@dataclass(frozen=True)
+class Linked:
+    """A linked module: its WGSL, the root module's name and the binding numbers that it uses."""
+
+    wgsl: str
+    module: str
+    used: frozenset[int]
+
+
+@dataclass
+class Linker:
+    """All modules of the package, and the virtual ones given per link."""
+
+    modules: dict[str, str] = field(default_factory=dict)
+    filenames: dict[str, str] = field(default_factory=dict)
+
+    @classmethod
+    def of_package(cls, package: str = "tyndall") -> Linker:
+        loaded = wesl.load_modules(files(package), namespace="package")
+        return cls(dict(loaded.modules), dict(loaded.filenames))
+
+    @cached_property
+    def _compiler(self) -> wesl.Compiler:
+        # Reflection wants every imported name to exist, though it reads none of the virtual modules' declarations.
+        virtual: dict[str, set[str]] = {}
+        for text in self.modules.values():
+            for module, names in _VIRTUAL_IMPORT.findall(text):
+                virtual.setdefault(module, set()).update(re.findall(r"\w+", names))
+        stubs = {
+            module: "".join(f"const {name} = 0u;\n" for name in sorted(names)) for module, names in virtual.items()
+        }
+        return wesl.Compiler(modules={**self.modules, **stubs}, filenames=self.filenames)
+
+    def dtype(self, path: str) -> np.dtype[Any]:
+        """The numpy layout of a WESL struct, ``package::wesl::light::Light``; its itemsize is the array stride."""
+        return wesl.reflect.numpy_dtype(self._compiler, path)
+
+    def workgroup(self, module: str, entry: str) -> tuple[int, int, int]:
+        """The workgroup size of a compute entry point."""
+        for point in wesl.reflect.classify_entry_points(self._compiler, module):
+            if point.fn_name == entry and point.workgroup_size is not None:
+                return point.workgroup_size
+        raise ShaderError(f"{self.filenames.get(module, module)}:1:1: no compute entry point '{entry}'")
+
+    def link(
+        self, module: str, entries: tuple[str, ...], bindings: str, overlay: Mapping[str, str], features: Mapping[str, bool]
+    ) -> Linked:
+        """Link the entry points of ``module``.
+
+        Args:
+            module: root module, ``package::…``.
+            entries: names of the entry points to keep.
+            bindings: text of ``package::bindings``.
+            overlay: virtual module name → real module name.
+            features: switches for ``@if``.
+
+        Raises:
+            ShaderError: a module does not parse or a name is missing.
+        """
+        modules = {**self.modules, _BINDINGS: bindings}
+        names = {**self.filenames, _BINDINGS: "<bindings>"}
+        for alias, real in overlay.items():
+            modules[alias], names[alias] = self.modules[real], self.filenames[real]
+        try:
+            result = wesl.compile(modules, root=module, keep=list(entries), filenames=names, features=dict(features))
+        except wesl.CompileError as error:
+            raise ShaderError(_describe(error, names.get(module, module))) from None
+        used = frozenset(int(n) for n in _USED.findall(result.wgsl))
+        return Linked(result.wgsl, module, used)
+
+    def locate(self, linked: Linked, line: int) -> str:
+        """``file:line:column`` of a line of linked WGSL: the source line that it was printed from.
+
+        The linker keeps declarations whole and prefixes the names of imported ones with their module, so the declaration
+        around the line names the module, and the source line there that shares the most words is the one.
+        """
+        lines = linked.wgsl.splitlines()
+        if not 0 < line <= len(lines):
+            return f"{self.filenames[linked.module]}:1:1"
+        module = linked.module
+        for start in range(line - 1, -1, -1):
+            if match := _DECLARATION.match(_ATTRIBUTE.sub("", lines[start])):
+                module = next((m for m in self.modules if match.group(1).startswith(_mangled(m))), linked.module)
+                break
+        words = set(re.findall(r"\w+", lines[line - 1].replace(_mangled(module), "")))
+        words |= {re.sub(r"^\w+_(?:_\d+)?", "", word) for word in words if word.startswith("package_")}
+        sources = list(enumerate(self.modules[module].splitlines(), 1))
+        number, text = max(sources, key=lambda item: (len(words & set(re.findall(r"\w+", item[1]))), -len(item[1])))
+        return f"{self.filenames[module]}:{number}:{len(text) - len(text.lstrip()) + 1}"
+
+
+def _mangled(module: str) -> str:
+    """The prefix that the linker gives to a module's names: a part with n underscores is preceded by ``_n``."""
+    parts = [f"_{part.count('_')}{part}" if "_" in part else part for part in module.split("::")]
+    return "_".join(parts) + "_"
+
+
+def _describe(error: wesl.CompileError, fallback: str) -> str:
+    if not error.diagnostics:
+        return f"{fallback}:1:1: {error}"
+    return "\n".join(
+        f"{d.filename or d.module or fallback}:{d.line or 1}:{d.column or 1}: {d.message}" for d in error.diagnostics
+    )
+
+
+def create_module(
+    device: wgpu.GPUDevice, linker: Linker, linked: Linked, label: str, *, trusted: bool = True
+) -> wgpu.GPUShaderModule:
+    """A shader module for the driver.
+
+    ``trusted`` code keeps bounds checks but drops the iteration limit that wgpu-native adds to every loop, which costs up
+    to 2.5× (measured on an H200). Code that a user wrote must not be trusted.
+
+    Raises:
+        ShaderError: the driver's validator refused it; positions are those of the WESL source.
+    """
+    try:
+        if trusted:
+            module = _create_trusted(device, linked.wgsl, label)
+            if module is not None:
+                return module
+        return device.create_shader_module(label=label, code=linked.wgsl)
+    except (wgpu.GPUError, RuntimeError) as error:
+        text = str(error)
+        position = _DRIVER_POSITION.search(text)
+        where = linker.locate(linked, int(position.group(1))) if position else f"{label}:1:1"
+        detail = [line.strip() for line in text.splitlines() if line.strip()]
+        raise ShaderError(f"{where}: " + "\n".join(detail)) from None
+
+
+def _create_trusted(device: wgpu.GPUDevice, code: str, label: str) -> wgpu.GPUShaderModule | None:
+    """wgpuDeviceCreateShaderModuleTrusted of wgpu-native, which wgpu-py 0.32 does not wrap; None where it is missing."""
+    try:
+        from wgpu.backends.wgpu_native import _api as api
+
+        create = api.libf.wgpuDeviceCreateShaderModuleTrusted
+        source = api.new_struct_p("WGPUShaderSourceWGSL *", code=api.to_c_string_view(code))
+        source[0].chain.next = api.ffi.NULL
+        source[0].chain.sType = api.lib.WGPUSType_ShaderSourceWGSL
+        descriptor = api.new_struct_p(
+            "WGPUShaderModuleDescriptor *",
+            nextInChain=api.ffi.cast("WGPUChainedStruct *", source),
+            label=api.to_c_string_view(label),
+        )
+        bounds_checks_only = 1
+    except (ImportError, AttributeError):
+        return None
+    handle = create(device._internal, descriptor, bounds_checks_only)
+    if handle == api.ffi.NULL:
+        return None
+    return api.GPUShaderModule(label, handle, device)

@@ -1,0 +1,142 @@
+"""What techniques have in common, and what each of them sees of a frame.
+
+A technique is a frozen dataclass of declared parameters with a name, a source and one method, ``render(view)``. Its shader
+is the ``.wesl`` file of the same name beside it. A :class:`View` gives it the frame's resources by name, textures of its
+own that live as long as the technique is in use, and passes whose names begin with the technique's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+from tyndall.gpu.device import ComputePass, Gpu
+from tyndall.gpu.params import check
+from tyndall.gpu.resources import Bound, Buffer, ParamsBuffer, Resource, Texture
+from tyndall.scene.model import Scene
+
+
+class Unsupported(ValueError):
+    """A technique cannot draw this scene; the message says why and what to use instead."""
+
+
+class Technique:
+    """Base of all techniques: parameters are checked when one is made.
+
+    Attributes:
+        name: as on the command line.
+        paper: who described it, and when.
+        advice: one honest line on when to use it.
+    """
+
+    name: ClassVar[str]
+    paper: ClassVar[str]
+    advice: ClassVar[str]
+
+    def __post_init__(self) -> None:
+        check(self)
+
+    @classmethod
+    def shader(cls) -> str:
+        """The WESL module beside the technique's Python module."""
+        return "package::" + cls.__module__.removeprefix("tyndall.").replace(".", "::")
+
+
+@dataclass
+class View:
+    """A frame, as one technique sees it.
+
+    Attributes:
+        images: the frame's images by name; "inscatter" (rgba32float) and "transmittance_map" are what a volumetric
+            technique writes.
+        scope: what the technique's shader may import from ``package::bindings``.
+        overlay: virtual modules, ``package::visibility`` among them once the shadows are drawn.
+        size: width and height of the picture in pixels.
+        frame: frames drawn before this one.
+        owner: "family.name": owner in the ledger and prefix of its passes.
+    """
+
+    gpu: Gpu
+    scene: Scene
+    size: tuple[int, int]
+    owner: str
+    technique: Technique
+    images: Mapping[str, Texture] = field(default_factory=dict)
+    scope: dict[str, Any] = field(default_factory=dict)
+    overlay: dict[str, str] = field(default_factory=dict)
+    frame: int = 0
+    _resources: dict[Any, Resource] = field(default_factory=dict)
+    _params: ParamsBuffer | None = None
+
+    @property
+    def params(self) -> Bound:
+        """The uniform of the technique's parameters."""
+        if self._params is None:
+            self._params = self.gpu.params(f"{self.owner}.params", self.technique, owner=self.owner)
+        return self._params.bound
+
+    def texture(
+        self, label: str, size: tuple[int, ...], format: str, *, dimension: str = "2d", usage: str = "sampled storage"
+    ) -> Texture:
+        """The technique's own texture of this label; made on first use, made anew when its description changes."""
+        made = self._owned(
+            label,
+            (size, format, dimension, usage),
+            lambda name: self.gpu.texture(name, size, format, owner=self.owner, dimension=dimension, usage=usage),
+        )
+        assert isinstance(made, Texture)
+        return made
+
+    def buffer(self, label: str, size: int, *, element: str, usage: str = "storage") -> Buffer:
+        """The technique's own buffer of this label and number of bytes, likewise."""
+        made = self._owned(
+            label,
+            (size, element, usage),
+            lambda name: self.gpu.buffer(name, size, owner=self.owner, element=element, usage=usage),
+        )
+        assert isinstance(made, Buffer)
+        return made
+
+    def _owned(self, label: str, description: Any, make: Any) -> Resource:
+        held = self._resources.get(label)
+        if held is not None and self._descriptions[label] == description:
+            return held
+        if held is not None:
+            held.destroy()
+            self.gpu.forget_groups()
+        self._descriptions[label] = description
+        made: Resource = make(f"{self.owner}.{label}")
+        self._resources[label] = made
+        return made
+
+    @property
+    def _descriptions(self) -> dict[str, Any]:
+        return self.__dict__.setdefault("_described", {})
+
+    def compute(self, entry: str, *, module: str | None = None) -> ComputePass:
+        """A compute pass named ``family.technique.entry`` that runs this entry point of the technique's shader."""
+        made = self.gpu.compute(f"{self.owner}.{entry}", module or self.technique.shader(), entry)
+        return made.bind(self.scope, params=self.params).overlay(self.overlay)
+
+    def close(self) -> None:
+        """Free the technique's textures and uniforms."""
+        for resource in self._resources.values():
+            resource.destroy()
+        self._resources.clear()
+        if self._params is not None:
+            self._params.destroy()
+            self._params = None
+
+
+@dataclass(frozen=True)
+class Visibility:
+    """What a shadow technique provides to the frame.
+
+    Attributes:
+        module: a WESL module with ``fn visibility(light: u32, position: vec3f, normal: vec3f) -> f32``.
+        bindings: what that module imports from ``package::bindings``.
+    """
+
+    module: str
+    bindings: Mapping[str, Any]

@@ -1,0 +1,6 @@
+"""Shadow techniques: each draws what it needs and provides ``visibility(light, position, normal)``."""
+
+from tyndall.techniques.contract import Technique
+from tyndall.techniques.shadow.shadow_map import ShadowMap
+
+MEMBERS: tuple[type[Technique], ...] = (ShadowMap,)

@@ -1,0 +1,8 @@
+"""Volumetric techniques: in-scattered light ``L_v`` and transmittance ``T`` of every pixel."""
+
+from tyndall.techniques.contract import Technique
+from tyndall.techniques.volumetric.froxel import Froxel
+from tyndall.techniques.volumetric.march import March
+from tyndall.techniques.volumetric.off import Off
+
+MEMBERS: tuple[type[Technique], ...] = (Off, Froxel, March)

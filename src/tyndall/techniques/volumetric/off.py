@@ -1,0 +1,21 @@
+"""No volumetric light: ``L_v = 0``, ``T = 1``, as in a vacuum."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from tyndall.techniques.contract import Technique, View
+
+
+@dataclass(frozen=True)
+class Off(Technique):
+    """The medium is left out."""
+
+    name: ClassVar[str] = "off"
+    paper: ClassVar[str] = "none"
+    advice: ClassVar[str] = "The base image alone, to see what the air adds and costs."
+
+    def render(self, view: View) -> None:
+        """Clear both images."""
+        view.compute("clear").dispatch(*view.size)
