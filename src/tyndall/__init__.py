@@ -1,12 +1,12 @@
 """Tyndall: a real-time light laboratory over WebGPU.
 
     >>> import tyndall as ty
-    >>> scene = ty.scenes.box(lights=1)
-    >>> scene.triangle_count
+    >>> ty.scenes.box(lights=3).triangle_count
     4968
 
 This module is the whole public API on one screen. Its imports are lazy: ``import tyndall`` loads nothing heavy, and a
-name loads its module when it is first used.
+name loads its module when it is first used. A scene is described with :class:`Scene` and what it holds, drawn with
+:func:`render`, measured with :func:`compare`, and drawn frame by frame with :class:`Renderer`.
 """
 
 from __future__ import annotations
@@ -15,7 +15,15 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from tyndall.frame import Renderer
+    from tyndall.gpu.device import GpuError
     from tyndall.gpu.params import ParameterError
+    from tyndall.lab.compare import Comparison, compare
+    from tyndall.lab.picture import Picture
+    from tyndall.lab.render import render
+    from tyndall.scene import bundled as scenes
+    from tyndall.scene.errors import SceneError
+    from tyndall.scene.files import load, save
     from tyndall.scene.model import (
         Camera,
         DirectionalLight,
@@ -34,45 +42,84 @@ if TYPE_CHECKING:
         SpotLight,
         Texture,
     )
+    from tyndall.scene.stage import stage
+    from tyndall.techniques.antialiasing import NoAntialiasing, Taa
+    from tyndall.techniques.shadow import ShadowMap
+    from tyndall.techniques.tonemap import Aces, Agx, Clip
+    from tyndall.techniques.volumetric import Froxel, March, Off
 
 __version__ = "0.1.0"
 
 __all__ = [
+    "Aces",
+    "Agx",
     "Camera",
+    "Clip",
+    "Comparison",
     "DirectionalLight",
+    "Froxel",
     "Gibbons",
+    "GpuError",
     "HenyeyGreenstein",
     "Image",
     "Instance",
     "Isotropic",
+    "March",
     "Material",
     "Medium",
     "Mesh",
+    "NoAntialiasing",
+    "Off",
     "ParameterError",
+    "Picture",
     "PointLight",
     "Rayleigh",
+    "Renderer",
     "Scene",
+    "SceneError",
     "Schlick",
+    "ShadowMap",
     "SpotLight",
+    "Taa",
     "Texture",
     "__version__",
+    "compare",
+    "load",
+    "render",
+    "save",
+    "scenes",
+    "stage",
 ]
 
-# Where a public name lives, the light modules first.
+# Where the public names live, the light modules first.
 _HOMES = (
     "tyndall.gpu.params",
+    "tyndall.scene.errors",
     "tyndall.scene.model",
+    "tyndall.scene.files",
+    "tyndall.scene.stage",
+    "tyndall.gpu.device",
+    "tyndall.techniques.volumetric",
+    "tyndall.techniques.shadow",
+    "tyndall.techniques.antialiasing",
+    "tyndall.techniques.tonemap",
+    "tyndall.frame",
+    "tyndall.lab.picture",
+    "tyndall.lab.render",
+    "tyndall.lab.compare",
 )
 
 
 def __getattr__(name: str) -> Any:
-    if name in __all__:
-        for home in _HOMES:
-            module = importlib.import_module(home)
-            if name in vars(module):
-                globals()[name] = vars(module)[name]
-                return globals()[name]
-    raise AttributeError(f"module 'tyndall' has no attribute '{name}'")
+    if name not in __all__:
+        raise AttributeError(f"module 'tyndall' has no attribute '{name}'")
+    if name == "scenes":
+        value: Any = importlib.import_module("tyndall.scene.bundled")
+    else:
+        modules = (importlib.import_module(home) for home in _HOMES)
+        value = next(vars(module)[name] for module in modules if name in vars(module))
+    globals()[name] = value
+    return value
 
 
 def __dir__() -> list[str]:

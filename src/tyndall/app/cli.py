@@ -233,6 +233,27 @@ def doctor(adapter: AdapterName = None, as_json: Json = False) -> None:
         raise typer.Exit(MISTAKE)
 
 
+@bench.command()
+def volumetric(
+    *,
+    quick: Annotated[bool, typer.Option("--quick", help="The same in small, for a software adapter.")] = False,
+    adapter: AdapterName = None,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for volumetric.json and volumetric.md.")] = (
+        Path("out/bench")
+    ),
+    as_json: Json = False,
+) -> None:
+    """Time, memory and error of the volumetric techniques against scenes, lights and resolution."""
+    from tyndall.lab import bench as figures
+
+    with console.Work("loading") as work:
+        result = figures.volumetric(adapter, out, quick=quick, progress=work.advance)
+    if as_json:
+        print(json.dumps(result.to_json(), indent=2))
+    else:
+        print(result.markdown())
+
+
 def main(words: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code.
 
