@@ -113,6 +113,8 @@ class Renderer:
 
     def _setup(self, techniques: dict[str, Technique]) -> None:
         gpu, size = self.gpu, self.size
+        if max(size) > (limit := gpu.limits["max-texture-dimension-2d"]):
+            raise GpuError(f"size: {size[0]}×{size[1]} is beyond this adapter's limit of {limit} pixels a side")
         for name, format in _IMAGES.items():
             drawn = name in _TARGETS or name in ("depth", "inscatter")
             stored = name not in (*_TARGETS, "depth")

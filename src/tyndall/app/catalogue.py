@@ -11,8 +11,10 @@ from tyndall.gpu.params import Field, ParameterError, describe_range, describe_t
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
+    from tyndall.techniques import Technique
 
-def find_techniques(name: str | None = None) -> list[tuple[str, type]]:
+
+def find_techniques(name: str | None = None) -> list[tuple[str, type[Technique]]]:
     """(family, technique) of every technique, of one family, or of one technique's name.
 
     Raises:
@@ -24,30 +26,25 @@ def find_techniques(name: str | None = None) -> list[tuple[str, type]]:
     if name is None:
         return every
     wanted = name.replace("-", "_")
-    found = [pair for pair in every if wanted in (pair[0], technique_name(pair[1]))]
+    found = [pair for pair in every if wanted in (pair[0], pair[1].name)]
     if not found:
-        known = [*FAMILIES, *(technique_name(member) for _, member in every)]
+        known = [*FAMILIES, *(member.name for _, member in every)]
         raise ParameterError(f"no technique or family '{name}'{nearest(wanted, known)}")
     return found
 
 
-def technique_name(technique: type) -> str:
-    """The name by which a technique is chosen."""
-    return str(vars(technique)["name"])
-
-
-def technique_json(family: str, technique: type) -> dict[str, Any]:
+def technique_json(family: str, technique: type[Technique]) -> dict[str, Any]:
     """Everything that a technique declares, as plain data."""
     return {
         "family": family,
-        "name": technique_name(technique),
+        "name": technique.name,
         "summary": summary(technique),
-        "paper": vars(technique)["paper"],
-        "advice": vars(technique)["advice"],
+        "paper": technique.paper,
+        "advice": technique.advice,
         "parameters": [
             {
                 "name": f.name,
-                "flag": f"--{technique_name(technique)}.{f.name}",
+                "flag": f"--{technique.name}.{f.name}",
                 "type": describe_type(f.type),
                 "default": None if f.default is MISSING else f.default,
                 "low": f.param.low,
@@ -61,7 +58,7 @@ def technique_json(family: str, technique: type) -> dict[str, Any]:
     }
 
 
-def techniques_table(techniques: list[tuple[str, type]]) -> RenderableType:
+def techniques_table(techniques: list[tuple[str, type[Technique]]]) -> RenderableType:
     """One paragraph and one table of parameters a technique, under its family's heading."""
     from rich.console import Group
     from rich.markup import escape
@@ -75,9 +72,9 @@ def techniques_table(techniques: list[tuple[str, type]]) -> RenderableType:
         if family != heading:
             heading = family
             parts.append(Text(family, style="bold underline"))
-        name = technique_name(technique)
+        name = technique.name
         about = [f"[bold cyan]{name}[/]  {escape(summary(technique))}"]
-        about += [escape(vars(technique)["advice"]), f"[dim]Paper: {escape(vars(technique)['paper'])}[/]"]
+        about += [escape(technique.advice), f"[dim]Paper: {escape(technique.paper)}[/]"]
         parts.append(Padding(Text.from_markup("\n".join(about)), (0, 0, 0, 2)))
         if fields := fields_of(technique):
             table = Table(box=None, show_header=False, padding=(0, 2, 0, 0))

@@ -99,7 +99,7 @@ def render(
         from tyndall.lab.render import render as draw
 
         check_folder(folder)
-        work.advance(0.1, "drawing")
+        work.advance(0.3, "drawing")
         picture = draw(
             described, size=pixels, parameters=parameters, frames=frames, adapter=adapter, seed=seed, **families
         )
@@ -292,7 +292,7 @@ def _explain(error: Exception) -> tuple[str, int]:
     # What the project raises on purpose is written for the user.
     if type(error).__module__.startswith("tyndall."):
         return str(error), MISTAKE
-    if isinstance(error, MemoryError):
+    if isinstance(error, MemoryError) or type(error).__name__ == "GPUOutOfMemoryError":
         return "not enough memory for what was asked", MISTAKE
     if isinstance(error, OSError) and error.strerror:
         return f"{error.filename or 'system'}: {error.strerror}", MISTAKE

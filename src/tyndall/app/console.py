@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import logging
 import sys
+import time
 import warnings
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 if TYPE_CHECKING:
-    from rich.console import Console, RenderableType
-    from rich.progress import Progress
+    from rich.console import RenderableType
 
 _WIDE = 150
+_HOLD_SECONDS = 2.0
 
 
 def print_result(renderable: RenderableType | str) -> None:
@@ -30,15 +31,14 @@ def say(line: str) -> None:
 class Work:
     """A piece of work with a progress bar on stderr.
 
-    The project's notes ("drawing with the software adapter …") and warnings are held back until the work has begun to
-    advance, or has ended well: where it fails at once, its error is the only line.
+    The project's notes ("drawing with the software adapter …") and warnings are held back until the work has gone on
+    for a while, or has ended well: where it fails at once, its error is the only line.
     """
 
     def __init__(self, title: str) -> None:
         self._title = title
         self._notes: list[str] = []
-        self._begun = False
-        self._progress: Progress | None = None
+        self._begun = time.monotonic()
 
     def __enter__(self) -> Self:
         from rich.console import Console
@@ -46,9 +46,10 @@ class Work:
 
         console = Console(stderr=True)
         columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:>3.0f} %"))
-        self._progress = Progress(*columns, TimeElapsedColumn(), console=console, transient=True)
-        self._task = self._progress.add_task(self._title, total=1.0)
-        self._console: Console = console
+        progress = Progress(*columns, TimeElapsedColumn(), console=console, transient=True)
+        self._task = progress.add_task(self._title, total=1.0)
+        self._progress = progress
+        self._console = console
         self._handler = _Hold(self)
         self._logger = logging.getLogger("tyndall")
         self._logger.addHandler(self._handler)
@@ -57,14 +58,14 @@ class Work:
         self._warnings.__enter__()
         warnings.showwarning = lambda message, *_, **__: self.note(str(message))
         if console.is_terminal:
-            self._progress.start()
+            progress.start()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        assert self._progress is not None
-        self._progress.stop()
+        if self._console.is_terminal:
+            self._progress.stop()
         self._warnings.__exit__(kind, error, trace)
         self._logger.removeHandler(self._handler)
         self._logger.propagate = self._propagated
@@ -73,18 +74,15 @@ class Work:
 
     def advance(self, fraction: float, stage: str) -> None:
         """Show which fraction of the whole is done, and what is being worked on."""
-        assert self._progress is not None
-        self._release()
+        if time.monotonic() - self._begun > _HOLD_SECONDS:
+            self._release()
         self._progress.update(self._task, description=stage, completed=fraction)
 
     def note(self, line: str) -> None:
-        """Tell something that is no error; now, or when the work has begun."""
+        """Tell something that is no error, in a while."""
         self._notes.append(line)
-        if self._begun:
-            self._release()
 
     def _release(self) -> None:
-        self._begun = True
         for line in dict.fromkeys(self._notes):
             self._console.print(f"tyndall: {line}", highlight=False, markup=False, soft_wrap=True)
         self._notes.clear()
