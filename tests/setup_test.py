@@ -5,7 +5,9 @@ from __future__ import annotations
 import re
 import shutil
 import subprocess
+import sys
 import tomllib
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -79,3 +81,20 @@ def test_the_lock_pins_everything_by_hash_and_names_no_index() -> None:
 
 def test_the_changelog_tells_of_this_version() -> None:
     assert f"\n## {tyndall.__version__}" in (ROOT / "CHANGELOG.md").read_text()
+
+
+def test_the_wheel_holds_every_shader_and_the_command(tmp_path: Path) -> None:
+    for name in ("pyproject.toml", "README.md", "LICENSE"):
+        shutil.copy(ROOT / name, tmp_path / name)
+    shutil.copytree(ROOT / "src", tmp_path / "src", ignore=shutil.ignore_patterns("*.egg-info", "__pycache__"))
+    pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "wheel", "--quiet"]
+    options = ["--no-deps", "--no-index", "--no-build-isolation", "--wheel-dir", tmp_path / "wheels", tmp_path]
+    subprocess.run([*pip, *options], check=True, capture_output=True, timeout=120)
+    (wheel,) = (tmp_path / "wheels").glob("*.whl")
+    with zipfile.ZipFile(wheel) as archive:
+        names = set(archive.namelist())
+        entry_points = archive.read(f"tyndall-{tyndall.__version__}.dist-info/entry_points.txt").decode()
+    shaders = {path.relative_to(ROOT / "src").as_posix() for path in (ROOT / "src").rglob("*.wesl")}
+    assert shaders
+    assert shaders <= names
+    assert "tyndall = tyndall.app.cli:main" in entry_points
