@@ -408,8 +408,13 @@ class Gpu:
         label: str,
         targets: Sequence[tuple[Any, tuple[float, float, float, float] | None]] = (),
         depth: tuple[Any, float | None] | None = None,
+        *,
+        depth_read_only: bool = False,
     ) -> Iterator[Any]:
-        """A render pass on native views. ``None`` as the clear value keeps what is there."""
+        """A render pass on native views. ``None`` as the clear value keeps what is there.
+
+        A read-only depth buffer is tested against, and shaders may read it in the same pass.
+        """
         descriptor: dict[str, Any] = {
             "label": label,
             "color_attachments": [
@@ -424,12 +429,16 @@ class Gpu:
         }
         if depth is not None:
             view, clear_depth = depth
-            descriptor["depth_stencil_attachment"] = {
-                "view": view,
-                "depth_load_op": "load" if clear_depth is None else "clear",
-                "depth_store_op": "store",
-                "depth_clear_value": clear_depth or 0.0,
-            }
+            descriptor["depth_stencil_attachment"] = (
+                {"view": view, "depth_read_only": True}
+                if depth_read_only
+                else {
+                    "view": view,
+                    "depth_load_op": "load" if clear_depth is None else "clear",
+                    "depth_store_op": "store",
+                    "depth_clear_value": clear_depth or 0.0,
+                }
+            )
         encoder = self.encoder
         if (stamps := self.timestamps(label)) is not None:
             descriptor["timestamp_writes"] = stamps

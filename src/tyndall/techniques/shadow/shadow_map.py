@@ -55,7 +55,7 @@ class ShadowMap(Technique):
         )
         rows = np.zeros(count, view.gpu.dtype(_LAYER))
         for row, layer in zip(rows, layers, strict=False):
-            row["view_proj"] = layer.matrix.T
+            row["view_proj"], row["inverse"] = layer.matrix.T, np.linalg.inv(layer.matrix).T
             row["texel"], row["perspective"] = layer.texel, layer.perspective
         table = view.buffer("layers", rows.nbytes, element=_LAYER)
         view.gpu.write(table, rows)
