@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from tyndall.techniques.antialiasing import NoAntialiasing, Taa
     from tyndall.techniques.shadow import ShadowMap
     from tyndall.techniques.tonemap import Aces, Agx, Clip
-    from tyndall.techniques.volumetric import Froxel, March, Off
+    from tyndall.techniques.volumetric import Froxel, March, Off, Polygonal, ScreenSpace
 
 __version__ = "0.1.0"
 
@@ -73,11 +73,13 @@ __all__ = [
     "ParameterError",
     "Picture",
     "PointLight",
+    "Polygonal",
     "Rayleigh",
     "Renderer",
     "Scene",
     "SceneError",
     "Schlick",
+    "ScreenSpace",
     "ShadowMap",
     "SpotLight",
     "Taa",
