@@ -44,6 +44,12 @@ def run_json(capsys: pytest.CaptureFixture[str], *words: str) -> Any:
     return json.loads(out)
 
 
+def pixels_of(path: Path) -> np.ndarray[Any, Any]:
+    """(H, W, 3) uint8."""
+    with Image.open(path) as image:
+        return np.asarray(image)
+
+
 # --- lists --------------------------------------------------------------------------------------------------------
 
 
@@ -117,7 +123,7 @@ def test_render_writes_a_png_and_an_exr(capsys: pytest.CaptureFixture[str], fold
     assert document["scene"] == "box"
     assert document["triangles"] == 4968
     assert document["size"] == [48, 27]
-    pixels = np.asarray(Image.open(folder / document["image"]))
+    pixels = pixels_of(folder / document["image"])
     assert pixels.shape == (27, 48, 3)
     assert pixels.std() > 1, "a picture of one colour"
     assert sorted(p.name for p in (folder / "made/here").iterdir()) == ["froxel.exr", "froxel.png"]
@@ -126,7 +132,7 @@ def test_render_writes_a_png_and_an_exr(capsys: pytest.CaptureFixture[str], fold
 def test_the_seed_and_the_parameters_reach_the_picture(capsys: pytest.CaptureFixture[str], folder: Path) -> None:
     def pixels(*words: str) -> np.ndarray[Any, Any]:
         document = run_json(capsys, "render", "box", "--size", "32x18", "--frames", "1", *words)
-        return np.asarray(Image.open(folder / document["image"]))
+        return pixels_of(folder / document["image"])
 
     plain = pixels("--technique", "march", "--march.steps", "8")
     assert np.array_equal(plain, pixels("--technique", "march", "--march.steps", "8"))
@@ -145,7 +151,7 @@ def test_compare_prints_the_documented_json_and_fills_a_folder(
         assert {"technique", "model", "gpu_ms", "frame_ms", "memory_bytes", "error", "image"} <= set(result)
         assert set(result["gpu_ms"]) == {"median", "min", "p95"}
         assert set(result["error"]) == {"rel_rmse", "psnr", "bias"}
-        assert Image.open(folder / result["image"]).size == (48, 27)
+        assert pixels_of(folder / result["image"]).shape == (27, 48, 3)
     off, froxel = document["results"]
     assert off["error"]["rel_rmse"] > froxel["error"]["rel_rmse"] > 0
     assert froxel["memory_bytes"] > off["memory_bytes"]
@@ -166,7 +172,7 @@ def test_a_mesh_file_is_put_on_a_stage(capsys: pytest.CaptureFixture[str], folde
     (folder / "mesh.obj").write_text(TETRAHEDRON)
     document = run_json(capsys, "render", "mesh.obj", "--size", "32x18", "--frames", "1", "--technique", "march")
     assert document["triangles"] > 4, "no ground"
-    assert np.asarray(Image.open(folder / document["image"])).std() > 1
+    assert pixels_of(folder / document["image"]).std() > 1
 
 
 def test_lights_are_placed_in_a_bundled_scene(capsys: pytest.CaptureFixture[str], folder: Path) -> None:
@@ -174,7 +180,7 @@ def test_lights_are_placed_in_a_bundled_scene(capsys: pytest.CaptureFixture[str]
         run_json(capsys, "render", "box", "--lights", n, "--size", "16x9", "--frames", "1", "--out", n)["image"]
         for n in ("1", "3")
     ]
-    one, three = (np.asarray(Image.open(folder / image)) for image in images)
+    one, three = (pixels_of(folder / image) for image in images)
     assert not np.array_equal(one, three)
 
 
@@ -184,7 +190,7 @@ def test_lights_are_placed_in_a_bundled_scene(capsys: pytest.CaptureFixture[str]
 @pytest.mark.parametrize(
     ("command", "message"),
     [
-        ("rendr box", "did you mean 'render'?"),
+        ("rendr box", "Did you mean 'render'?"),
         ("render", "SCENE"),
         ("render bocks", "did you mean 'box'?"),
         ("render nothing.glb", "nothing.glb"),

@@ -61,12 +61,17 @@ Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on 
 
 @app.callback(invoke_without_command=True)
 def _global(
+    context: typer.Context,
+    *,
     version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
     debug: Annotated[bool, typer.Option("--debug", help="Show where an error came from.")] = False,
 ) -> None:
     if version:
         print(f"tyndall {__version__}")
         raise typer.Exit
+    if context.obj and context.invoked_subcommand not in (render.__name__, compare.__name__):
+        technique, parameter, _ = context.obj[0]
+        raise ParameterError(f"--{technique}.{parameter}: {context.invoked_subcommand} draws nothing with it")
 
 
 @app.command()
