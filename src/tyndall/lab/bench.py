@@ -33,8 +33,8 @@ from tyndall.lab.compare import check_folder
 from tyndall.lab.fingerprint import scene_hash, versions
 from tyndall.lab.measure import Measurement, measure
 from tyndall.lab.picture import write_atomically
-from tyndall.lab.reference import Converged, converge
-from tyndall.lab.stage import Overrides, Stage, Still, describe, make
+from tyndall.lab.reference import Reference, find
+from tyndall.lab.stage import Overrides, Stage, describe, make
 from tyndall.scene import bundled
 from tyndall.scene.model import Scene
 from tyndall.techniques.contract import Technique
@@ -264,16 +264,16 @@ class _Run:
                 finest = finest or same
                 (row,) = self._sweep(stage, "polygonal", None, [size], same)
                 still = stage.still(self._technique("polygonal", scene))
-                row |= {"against_finest": _errors(still.light, finest.value.light)}
+                row |= {"against_finest": _errors(still.light, finest.still.light)}
                 sweeps["polygonal"].insert(0, row)
         return {
             "scene_hash": scene_hash(scene),
-            "reference": {"steps": truth.steps, "change_on_doubling": truth.change, "converged": truth.within},
+            "reference": truth.to_json(),
             "sweeps": sweeps,
         }
 
     def _sweep(
-        self, stage: Stage, name: str, parameter: str | None, values: Iterable[Any], truth: Converged[Still]
+        self, stage: Stage, name: str, parameter: str | None, values: Iterable[Any], truth: Reference
     ) -> list[dict[str, Any]]:
         rows = []
         for value in values:
@@ -283,22 +283,16 @@ class _Run:
                 technique = replace(technique, {parameter: value})
             row = self._row(stage, technique)
             light = stage.still(technique).light
-            rows.append({"resolution": value, **row, "error": _errors(light, truth.value.light)})
+            rows.append({"resolution": value, **row, "error": _errors(light, truth.still.light)})
         return rows
 
     def _row(self, stage: Stage, technique: Technique) -> dict[str, Any]:
         s = self.settings
-        with stage.renderer(technique) as renderer:
-            measured = measure(renderer, frames=s.frames, warmup=s.warmup, budget_s=s.seconds)
+        measured = measure(stage.use(technique), frames=s.frames, warmup=s.warmup, budget_s=s.seconds)
         return {"technique": technique.name, "parameters": describe(technique), **_figures(measured)}
 
-    def _reference(self, stage: Stage) -> Converged[Still]:
-        march = replace(self._technique("march", stage.scene), {"jitter": 0})
-        return converge(
-            lambda steps: stage.still(replace(march, {"steps": steps})),
-            lambda still: still.light,
-            budget_s=4 * self.settings.seconds,
-        )
+    def _reference(self, stage: Stage) -> Reference:
+        return find(stage, budget_s=4 * self.settings.seconds)
 
     def _technique(self, name: str, scene: Scene) -> Technique:
         return make("volumetric", name, scene, self.settings.parameters())

@@ -37,7 +37,7 @@ from tyndall.lab.closeup import strip
 from tyndall.lab.fingerprint import scene_hash, versions
 from tyndall.lab.measure import Measurement, measure
 from tyndall.lab.picture import OutputError, Picture, encode_png
-from tyndall.lab.reference import Converged, converge
+from tyndall.lab.reference import Reference, find
 from tyndall.lab.stage import Overrides, Stage, Still, describe, make
 from tyndall.scene.model import Scene
 from tyndall.techniques import FAMILIES
@@ -48,11 +48,9 @@ if TYPE_CHECKING:
 
 Progress = Callable[[float, str], object]
 
-# On a device that draws a frame in milliseconds none of these is reached; on a software adapter they keep a comparison
-# of five techniques at 640×360 within a minute.
-_MEASURE_BUDGET_S = 3.0
-_REFERENCE_BUDGET_S = 15.0
-_BEAUTY_BUDGET_S = 4.0
+# A device that draws a frame in milliseconds never needs it; by it, a software adapter compares five techniques at
+# 640×360 within a minute.
+_MEASURE_BUDGET_S = 2.0
 _FRAMES, _WARMUP = 64, 16
 
 
@@ -120,25 +118,6 @@ class Result:
         }
 
 
-@dataclass(frozen=True, eq=False)
-class Reference:
-    """The converged reference, as a still frame and as an antialiased picture, with the search that found it."""
-
-    technique: str
-    found: Converged[Still]
-    picture: Picture
-
-    def to_json(self) -> dict[str, Any]:
-        """How it was made, and the mean of its ``L_v`` that errors are relative to."""
-        return {
-            "technique": self.technique,
-            "steps": self.found.steps,
-            "change_on_doubling": round(self.found.change, 6),
-            "converged": self.found.within,
-            "mean": float(self.found.value.light.mean(dtype=np.float64)),
-        }
-
-
 @dataclass(eq=False)
 class Comparison:
     """The same view by several techniques: see :func:`compare`.
@@ -147,6 +126,7 @@ class Comparison:
         scene: name of the scene.
         results: in the order asked for.
         reference: None where none was asked for.
+        portrait: the reference's picture, antialiased where that was quick; else its still frame.
         skipped: why a technique that was not asked for by name took no part, by name.
         folder: where it was saved last, or None.
     """
@@ -160,6 +140,7 @@ class Comparison:
     parameters: Mapping[str, Any]
     results: list[Result]
     reference: Reference | None
+    portrait: Picture | None
     skipped: Mapping[str, str] = field(default_factory=dict)
     folder: Path | None = None
 
@@ -204,11 +185,11 @@ class Comparison:
     def _notes(self) -> list[str]:
         notes = []
         if self.reference:
-            found = self.reference.found
-            state = "converged" if found.within else "NOT converged"
+            truth = self.reference
+            state = "converged" if truth.within else "NOT converged"
             notes.append(
-                f"reference: {self.reference.technique}, {found.steps} steps, {state}: "
-                f"the last doubling changed L_v by {_percent(found.change)}"
+                f"reference: {truth.technique}, {truth.steps} steps, {state}: "
+                f"twice as many change L_v by {_percent(truth.change)}"
             )
         if any(result.model == "paper" for result in self.results):
             notes.append("* the paper's model has its own units; it is held against the same physical reference")
@@ -267,14 +248,15 @@ class Comparison:
         for result in self.results:
             result.picture.save(folder / f"{result.label}.png")
             result.picture.save(folder / f"{result.label}.exr")
-        if self.reference:
-            self.reference.picture.save(folder / "reference.png")
-            self.reference.picture.save(folder / "reference.exr")
-            still = self.reference.found.value.picture.pixels
-            name = f"{self.reference.technique}, {self.reference.found.steps} steps"
+        if self.reference and self.portrait:
+            self.portrait.save(folder / "reference.png")
+            self.portrait.save(folder / "reference.exr")
+            still = self.reference.still.picture.pixels
+            truth = f"{self.reference.technique}, {self.reference.steps} steps"
             for result in self.results:
                 if result.error_map is not None:
-                    names = (name, result.label)
+                    score = f", rel. RMSE of L_v {_percent(result.error.rel_rmse)}" if result.error else ""
+                    names = (truth, result.label + score)
                     pixels = strip(still, result.still.picture.pixels, result.error_map, names)
                     (folder / f"{result.label}-closeup.png").write_bytes(encode_png(pixels))
         document = json.dumps(self._json(lambda label: f"{label}.png"), indent=2, ensure_ascii=False)
@@ -287,8 +269,8 @@ class Comparison:
         console.print(self.table())
         table = console.export_html(inline_styles=True, code_format='<pre style="line-height:1.25">{code}</pre>')
         pictures = [(result.label, result.picture) for result in self.results]
-        if self.reference:
-            pictures.append(("reference", self.reference.picture))
+        if self.portrait:
+            pictures.append(("reference", self.portrait))
         figures = "".join(
             f'<figure style="display:inline-block;margin:4px"><img width="320" src="data:image/png;base64,'
             f'{base64.b64encode(picture._repr_png_()).decode()}"><figcaption>{label}</figcaption></figure>'
@@ -345,7 +327,11 @@ def compare(
     others = {"shadow": shadow, "antialiasing": antialiasing, "tonemap": tonemap}
     with Stage(scene, size, parameters=parameters, adapter=adapter, seed=seed, **others) as stage:
         tell = _Telling(progress, len(techniques) + (reference is not None))
-        truth = _reference(stage, reference, tell) if reference is not None else None
+        truth = portrait = None
+        if reference is not None:
+            tell.begin("reference")
+            truth = find(stage, reference, progress=tell.inside)
+            portrait = _portrait(stage, truth)
         results, skipped = [], {}
         for technique in techniques:
             tell.begin(technique.name)
@@ -369,6 +355,7 @@ def compare(
             },
             results=results,
             reference=truth,
+            portrait=portrait,
             skipped=skipped,
         )
     if out is not None:
@@ -430,50 +417,32 @@ class _Telling:
             self._progress(fraction, text)
 
 
-def _reference(stage: Stage, name: str, tell: _Telling) -> Reference:
-    base = make("volumetric", name, stage.scene)
-    names = {f.name for f in fields_of(type(base))}
-    if "steps" not in names:
-        raise ParameterError(f"reference: '{name}' has no number of steps to converge with; 'march' has")
-    if "jitter" in names:
-        base = replace(base, {"jitter": 0})
-    tell.begin("reference")
-    found = converge(
-        lambda steps: stage.still(replace(base, {"steps": steps})),
-        lambda still: still.light,
-        budget_s=_REFERENCE_BUDGET_S,
-        progress=tell.inside,
-    )
-    # An antialiased picture takes several frames. Where those of the converged march would take too long, fewer steps
-    # do: nothing is measured on this picture.
-    steps, seconds = found.steps, found.seconds
-    while 8 * seconds > _BEAUTY_BUDGET_S and steps > 64:
-        steps, seconds = steps // 2, seconds / 2
-    technique = replace(base, {"steps": steps})
-    with stage.renderer(technique) as renderer:
-        for _ in range(8):
-            renderer.draw()
-        picture = stage.picture(renderer, f"{name}, {steps} steps")
-    return Reference(name, found, picture)
+def _portrait(stage: Stage, truth: Reference, seconds: float = 8.0) -> Picture:
+    """The reference as it is saved: antialiased like the techniques where that takes no longer than ``seconds``."""
+    if 16 * truth.seconds > seconds:
+        return truth.still.picture
+    renderer = stage.use(truth.made)
+    for _ in range(16):
+        renderer.draw()
+    return stage.picture(truth.technique)
 
 
 def _one(
     stage: Stage, technique: Technique, truth: Reference | None, frames: int | None, warmup: int | None, tell: _Telling
 ) -> Result:
-    with stage.renderer(technique) as renderer:
-        measurement = measure(
-            renderer,
-            frames=frames or _FRAMES,
-            warmup=_WARMUP if warmup is None else warmup,
-            budget_s=_MEASURE_BUDGET_S if frames is None else None,
-            progress=tell.inside,
-        )
-        picture = stage.picture(renderer, technique.name)
+    measurement = measure(
+        stage.use(technique),
+        frames=frames or _FRAMES,
+        warmup=_WARMUP if warmup is None else warmup,
+        budget_s=_MEASURE_BUDGET_S if frames is None else None,
+        progress=tell.inside,
+    )
+    picture = stage.picture(technique.name)
     still = stage.still(technique)
     error = None
     error_map = None
     if truth is not None:
-        reference = truth.found.value
+        reference = truth.still
         rel_rmse = metrics.rel_rmse(still.light, reference.light)
         bias = metrics.bias(still.light, reference.light)
         error_map = metrics.error_map(still.light, reference.light)

@@ -107,7 +107,7 @@ def measure(
 ) -> Measurement:
     """Draw ``warmup`` frames, then measure ``frames`` more.
 
-    With ``budget_s`` it stops early, after at least one warm-up and three measured frames, so that both parts together
+    With ``budget_s`` it stops early, after at least one warm-up and two measured frames, so that both parts together
     end near that many seconds on a slow adapter; a fast one never notices. ``progress`` hears a fraction of 1.
 
     Raises:
@@ -127,11 +127,11 @@ def measure(
         renderer.draw()
         renderer.timings()
         if progress:
-            progress(max((done + 1) / total, spent()))
+            progress(min(1.0, max((done + 1) / total, spent())))
 
     host: list[float] = []
     samples: list[dict[str, float]] = []
-    while len(samples) < frames and (len(samples) < 3 or spent() < 1):
+    while len(samples) < frames and (len(samples) < 2 or spent() < 1):
         host.append(renderer.draw())
         samples.append(renderer.timings())
         if progress:

@@ -65,7 +65,7 @@ def test_a_slow_adapter_stays_in_its_budget() -> None:
     start = time.monotonic()
     found = measure(Scripted(seconds=0.02), frames=10_000, warmup=1000, budget_s=0.3, progress=heard.append)
     assert time.monotonic() - start < 2
-    assert 3 <= found.frames < 100
+    assert 2 <= found.frames < 100
     assert heard == sorted(heard)
     assert heard[-1] <= 1
 

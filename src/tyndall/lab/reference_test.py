@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 import pytest
 
@@ -34,16 +32,6 @@ def test_it_says_when_it_has_not_converged() -> None:
     found = converge(march, lambda image: image, start=4, limit=16, tolerance=1e-6)
     assert (found.steps, found.within) == (16, False)
     assert found.change > 1e-6
-
-
-def test_a_budget_ends_the_search() -> None:
-    def slow(steps: int) -> np.ndarray:
-        time.sleep(0.02)
-        return march(steps)
-
-    found = converge(slow, lambda image: image, start=4, limit=1 << 20, tolerance=1e-12, budget_s=0.1)
-    assert not found.within
-    assert found.steps <= 128
 
 
 def test_without_light_nothing_changes() -> None:

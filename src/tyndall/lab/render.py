@@ -43,7 +43,7 @@ def render(
     others = {"shadow": shadow, "antialiasing": antialiasing, "tonemap": tonemap}
     with Stage(scene, size, parameters=parameters, adapter=adapter, seed=seed, **others) as stage:
         technique = make("volumetric", volumetric, scene, parameters)
-        with stage.renderer(technique) as renderer:
-            for _ in range(frames):
-                renderer.draw()
-            return stage.picture(renderer, technique.name)
+        renderer = stage.use(technique)
+        for _ in range(frames):
+            renderer.draw()
+        return stage.picture(technique.name)

@@ -1,8 +1,9 @@
 """One scene on one device at one size, to be drawn by one technique after another.
 
 Comparisons must differ in one thing only. A :class:`Stage` keeps the rest: the device with its compiled pipelines, the
-scene, the size, the seed, and the techniques of the other families. :meth:`Stage.still` draws the one frame that errors
-are measured on: no antialiasing, hence no camera jitter, so that pixels of two techniques look along the same rays.
+scene on that device, the size, the seed, and the techniques of the other families. :meth:`Stage.still` draws the one
+frame that errors are measured on: no antialiasing, hence no camera jitter, so that equal pixels of two techniques look
+along equal rays.
 """
 
 from __future__ import annotations
@@ -61,7 +62,7 @@ class Stage:
         shadow, antialiasing, tonemap: techniques by name, ready made, or None for the family's default.
 
     Raises:
-        GpuError: no such adapter.
+        GpuError: no such adapter, or a size beyond its limits.
         ParameterError: no such technique or parameter.
     """
 
@@ -83,6 +84,21 @@ class Stage:
         self.tonemap = make("tonemap", tonemap, scene, parameters)
         self._owned = not isinstance(adapter, Gpu)
         self.gpu = adapter if isinstance(adapter, Gpu) else Gpu(adapter)
+        try:
+            self._renderer = Renderer(
+                scene,
+                size,
+                gpu=self.gpu,
+                volumetric="off",
+                shadow=self.shadow,
+                antialiasing=self.antialiasing,
+                tonemap=self.tonemap,
+                seed=seed,
+            )
+        except BaseException:
+            if self._owned:
+                self.gpu.close()
+            raise
 
     @property
     def adapter(self) -> str:
@@ -95,32 +111,43 @@ class Stage:
         info = self.gpu.adapter_info
         return f"{info['description']} ({info['backend_type']})".strip()
 
-    def renderer(self, volumetric: Technique, *, still: bool = False) -> Renderer:
-        """A renderer with a volumetric technique; ``still`` leaves antialiasing, and with it the jitter, out."""
-        return Renderer(
-            self.scene,
-            self.size,
-            gpu=self.gpu,
-            volumetric=volumetric,
-            shadow=self.shadow,
-            antialiasing=make("antialiasing", "none", self.scene) if still else self.antialiasing,
-            tonemap=self.tonemap,
-            seed=self.seed,
-        )
+    def use(self, volumetric: Technique, *, still: bool = False) -> Renderer:
+        """The renderer with a volumetric technique, at its first frame; ``still`` leaves antialiasing out.
+
+        Raises:
+            Unsupported: the technique cannot draw this scene.
+        """
+        self._renderer.use("volumetric", volumetric)
+        self._renderer.use("antialiasing", "none" if still else self.antialiasing)
+        self._renderer.restart()
+        return self._renderer
 
     def still(self, volumetric: Technique) -> Still:
         """One frame without antialiasing."""
-        with self.renderer(volumetric, still=True) as renderer:
-            renderer.draw()
-            return Still(self.picture(renderer, volumetric.name), renderer.inscattered())
+        renderer = self.use(volumetric, still=True)
+        renderer.draw()
+        return Still(self.picture(volumetric.name), renderer.inscattered())
 
-    def picture(self, renderer: Renderer, technique: str) -> Picture:
-        """The frame that ``renderer`` drew last."""
+    def resized(self, size: tuple[int, int]) -> Stage:
+        """Another stage that differs in its size only, on the same device."""
+        return Stage(
+            self.scene,
+            size,
+            shadow=self.shadow,
+            antialiasing=self.antialiasing,
+            tonemap=self.tonemap,
+            adapter=self.gpu,
+            seed=self.seed,
+        )
+
+    def picture(self, technique: str) -> Picture:
+        """The frame drawn last."""
         made = {"scene": self.scene.name, "technique": technique, "adapter": self.adapter}
-        return Picture(renderer.picture(), renderer.radiance(), renderer.depth(), made)
+        return Picture(self._renderer.picture(), self._renderer.radiance(), self._renderer.depth(), made)
 
     def close(self) -> None:
-        """Free the device, unless it was given."""
+        """Free everything but a device that was given."""
+        self._renderer.close()
         if self._owned:
             self.gpu.close()
 
