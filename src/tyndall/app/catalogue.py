@@ -122,7 +122,6 @@ def scenes_json() -> list[dict[str, Any]]:
             "name": name,
             "triangles": bundled.TRIANGLES[name],
             "summary": summary(make),
-            "lights": "lights" in inspect.signature(make).parameters,
         }
         for name, make in bundled.SCENES.items()
     ]

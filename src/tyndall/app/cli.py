@@ -48,9 +48,7 @@ Model = Annotated[
     Literal["paper", "physical"] | None,
     typer.Option(help="The equations of the techniques' papers, or single scattering in the scene's medium."),
 ]
-Lights = Annotated[
-    int | None, typer.Option(metavar="N", help="Number of lights, for the bundled scenes that place them.")
-]
+Lights = Annotated[int | None, typer.Option(metavar="N", help="Number of lights, 1 to 32, for a bundled scene.")]
 AdapterName = Annotated[
     str | None, typer.Option("--adapter", metavar="NAME", help="Part of an adapter's name; see `tyndall doctor`.")
 ]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 from pathlib import Path
 
 from tyndall.gpu.params import ParameterError, nearest
@@ -17,7 +16,7 @@ def open_scene(name: str, lights: int | None = None) -> Scene:
 
     Args:
         name: a bundled scene's name, or the path of a file.
-        lights: how many lights, for the bundled scenes that place them.
+        lights: how many lights; only a bundled scene places them.
 
     Raises:
         ParameterError: neither a scene nor a file, or a number of lights that the scene does not take.
@@ -25,18 +24,14 @@ def open_scene(name: str, lights: int | None = None) -> Scene:
     """
     make = bundled.SCENES.get(name)
     if make is not None:
-        if lights is None:
-            return make()
-        if "lights" not in inspect.signature(make).parameters:
-            raise ParameterError(f"--lights: '{name}' has its own lights")
-        return make(lights=lights)
+        return make() if lights is None else make(lights=lights)
     path = Path(name)
     if path.suffix.lower() not in SUFFIXES and not path.exists():
         known = ", ".join(bundled.SCENES)
         raise ParameterError(
             f"no scene '{name}'{nearest(name, bundled.SCENES)}; there are {known}, and files of {', '.join(SUFFIXES)}"
         )
-    scene = load(path)
     if lights is not None:
-        raise ParameterError(f"--lights: {name} has its own lights; only bundled scenes place them")
+        raise ParameterError(f"--lights: {name} has its own lights; only a bundled scene places them")
+    scene = load(path)
     return stage(scene) if path.suffix.lower() in MESH_SUFFIXES else scene
