@@ -304,8 +304,7 @@ class _Run:
         key = (name, lights)
         if key not in self._made:
             self._say(f"building {name}")
-            maker = getattr(bundled, name)
-            self._made[key] = maker(lights=lights) if lights != 1 else maker()
+            self._made[key] = bundled.SCENES[name](lights=lights)
         return self._made[key]
 
     def _stage(self, scene: Scene, shadow_size: int | None = None) -> Stage:
