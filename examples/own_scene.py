@@ -16,4 +16,4 @@ scene = ty.Scene(
     name="pyramid",
 )
 ty.save(scene, "pyramid.json")
-ty.render(ty.load("pyramid.json"), size=(320, 180)).save("pyramid.png")
+ty.render(ty.load("pyramid.json"), size=(320, 180), volumetric=ty.March(steps=32), frames=4).save("pyramid.png")
