@@ -131,15 +131,16 @@ class Renderer:
         self._scope: dict[str, Any] = {
             "camera": self._camera.uniform(),
             "medium": self._medium.uniform(),
-            "lights": self._lights,
-            "black": black,
+            "lights": self._lights.read(),
+            "black": black.sampled(),
             **{name: self._images[name].sampled() for name in _IMAGES if name != "picture"},
             "inscatter_out": self._images["inscatter"].write(),
             "transmittance_out": self._images["transmittance_map"].write(),
         }
         gpu.write(self._medium, pack_medium(self.scene.medium, gpu.dtype(_MEDIUM)))
         gpu.write(self._lights, pack_lights(self.scene, gpu.dtype(_LIGHT)))
-        self._previous_camera: Camera | None = None
+        self._camera_seen: Camera | None = None
+        self._camera_row: Any = None
         for family, technique in techniques.items():
             self.use(family, technique)
 
@@ -216,21 +217,20 @@ class Renderer:
 
     def _update(self, camera: Camera, jitter: bool) -> None:
         shift = self.technique("antialiasing").jitter(self._frame) if jitter else (0.0, 0.0)
-        if camera != self._previous_camera:
-            self._history = 0 if self._previous_camera is None else min(self._history, 8)
-            self._previous_camera = camera
-        row = pack_camera(camera, self.scene, self.size, shift, self.gpu.dtype(_CAMERA))
-        still = row["still_view_proj"].copy()
-        row["previous_view_proj"] = still if self._previous is None else self._previous
+        if camera != self._camera_seen:
+            self._history = 0 if self._camera_seen is None else min(self._history, 8)
+            self._camera_seen = camera
+            self._camera_row = pack_camera(camera, self.scene, self.size, self.gpu.dtype(_CAMERA))
+        row = shifted(self._camera_row, shift)
+        row["previous_view_proj"] = row["still_view_proj"] if self._previous is None else self._previous
         row["frame"], row["seed"], row["history"] = self._frame, self.seed, self._history
-        self._previous = still
+        self._previous = row["still_view_proj"]
         self.gpu.write(self._camera, row)
 
     def restart(self) -> None:
         """Forget temporal history: the next frame is like the first."""
         self._frame = self._history = 0
-        self._previous = None
-        self._previous_camera = None
+        self._previous = self._camera_seen = None
 
     # --- results --------------------------------------------------------------------------------------------------
 
@@ -258,7 +258,7 @@ class Renderer:
         """(height, width) float32: metres along the view axis, infinite for the background."""
         raw = self.gpu.read_texture(self._images["depth"])[..., 0].astype(np.float32)
         with np.errstate(divide="ignore"):
-            return np.float32(self._previous_camera.near if self._previous_camera else 1) / raw
+            return np.float32(self._camera_seen.near if self._camera_seen else 1) / raw
 
     def timings(self) -> dict[str, float]:
         """GPU milliseconds of the last frame by pass name, and "frame" for the whole; waits for it.
@@ -315,32 +315,40 @@ def view_matrix(camera: Camera) -> NDArray[np.float64]:
     return matrix
 
 
-def projection_matrix(camera: Camera, aspect: float, shift: tuple[float, float] = (0.0, 0.0)) -> NDArray[np.float64]:
-    """Camera space to reversed-Z clip space with an infinite far plane; ``shift`` in normalised device coordinates."""
+def projection_matrix(camera: Camera, aspect: float) -> NDArray[np.float64]:
+    """Camera space to reversed-Z clip space with an infinite far plane."""
     f = 1 / math.tan(camera.fov / 2)
-    return np.array([[f / aspect, 0, -shift[0], 0], [0, f, -shift[1], 0], [0, 0, 0, camera.near], [0, 0, -1, 0]])
+    return np.array([[f / aspect, 0, 0, 0], [0, f, 0, 0], [0, 0, 0, camera.near], [0, 0, -1, 0]])
 
 
-def pack_camera(
-    camera: Camera, scene: Scene, size: tuple[int, int], shift: tuple[float, float], dtype: np.dtype[Any]
-) -> Any:
-    """The camera's uniform. ``shift`` moves the samples by that many pixels (right, down)."""
+def pack_camera(camera: Camera, scene: Scene, size: tuple[int, int], dtype: np.dtype[Any]) -> Any:
+    """The camera's uniform, for samples at the pixels' centres."""
     aspect = size[0] / size[1]
-    ndc = (-2 * shift[0] / size[0], 2 * shift[1] / size[1])  # the picture moves against the samples
     view = view_matrix(camera)
     tangent = math.tan(camera.fov / 2)
     row = np.zeros((), dtype)
-    row["view_proj"] = (projection_matrix(camera, aspect, ndc) @ view).T
-    row["still_view_proj"] = (projection_matrix(camera, aspect) @ view).T
+    row["view_proj"] = row["still_view_proj"] = (projection_matrix(camera, aspect) @ view).T
     row["position"], row["near"] = camera.position, camera.near
     row["right"], row["up"] = view[0, :3] * tangent * aspect, view[1, :3] * tangent
     row["forward"] = -view[2, :3]
     row["exposure"] = 2.0**camera.exposure
     row["light_count"] = len(scene.lights)
     row["ambient"], row["background"] = scene.ambient, scene.background
-    row["jitter"], row["size"] = ndc, size
+    row["size"] = size
     row["start"], row["reach"] = depth_range(camera, scene)
     return row
+
+
+def shifted(row: Any, shift: tuple[float, float]) -> Any:
+    """A copy of a camera's uniform whose samples lie that many pixels (right, down) of the pixels' centres."""
+    moved = row.copy()
+    width, height = row["size"]
+    ndc = (-2 * shift[0] / width, 2 * shift[1] / height)  # the picture moves against the samples
+    moved["jitter"] = ndc
+    for axis in range(2):
+        # clip.xy += ndc·clip.w; the matrix is stored by columns.
+        moved["view_proj"][:, axis] += np.float32(ndc[axis]) * row["view_proj"][:, 3]
+    return moved
 
 
 def depth_range(camera: Camera, scene: Scene) -> tuple[float, float]:

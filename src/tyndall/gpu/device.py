@@ -500,13 +500,20 @@ class Gpu:
         raw = np.frombuffer(self._readback.read_mapped(0, 16 * len(labels)), np.uint64).astype(np.float64)
         self._readback.unmap()
         stamps = raw.reshape(-1, 2) * self._period * 1e-6
+        if self.adapter_info["adapter_type"] == "CPU":
+            # Mesa's software adapter runs passes one after another, but may stamp a pass's beginning only when its work is
+            # done; the end of the pass before is when it really began.
+            stamps[1:, 0] = stamps[:-1, 1]
         times = [(label, float(max(0.0, end - begin))) for label, (begin, end) in zip(labels, stamps, strict=True)]
         return [*times, ("frame", float(stamps[:, 1].max() - stamps[:, 0].min()))]
 
     def wait(self) -> None:
         """Block until the device has finished all submitted work."""
         self.submit()
-        self.device.queue.on_submitted_work_done_sync()
+        # wgpu-py 0.32 declares the callback of on_submitted_work_done wrongly; reading four bytes back waits as well.
+        fence = self.device.create_buffer(size=4, usage=wgpu.BufferUsage.COPY_SRC)
+        self.device.queue.read_buffer(fence)
+        fence.destroy()
 
     # --- pipelines ------------------------------------------------------------------------------------------------
 

@@ -51,6 +51,7 @@ class Linker:
 
     modules: dict[str, str] = field(default_factory=dict)
     filenames: dict[str, str] = field(default_factory=dict)
+    _dtypes: dict[str, np.dtype[Any]] = field(default_factory=dict, repr=False)
 
     @classmethod
     def of_package(cls, package: str = "tyndall") -> Linker:
@@ -71,7 +72,9 @@ class Linker:
 
     def dtype(self, path: str) -> np.dtype[Any]:
         """The numpy layout of a WESL struct, ``package::wesl::light::Light``; its itemsize is the array stride."""
-        return wesl.reflect.numpy_dtype(self._compiler, path)
+        if path not in self._dtypes:
+            self._dtypes[path] = wesl.reflect.numpy_dtype(self._compiler, path)
+        return self._dtypes[path]
 
     def workgroup(self, module: str, entry: str) -> tuple[int, int, int]:
         """The workgroup size of a compute entry point."""

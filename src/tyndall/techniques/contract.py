@@ -7,9 +7,11 @@ own that live as long as the technique is in use, and passes whose names begin w
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
+
+from numpy.typing import NDArray
 
 from tyndall.gpu.device import ComputePass, Gpu
 from tyndall.gpu.params import check
@@ -88,12 +90,12 @@ class View:
         assert isinstance(made, Texture)
         return made
 
-    def buffer(self, label: str, size: int, *, element: str, usage: str = "storage") -> Buffer:
-        """The technique's own buffer of this label and number of bytes, likewise."""
+    def buffer(self, label: str, make: Callable[[], NDArray[Any]], *, element: str) -> Buffer:
+        """The technique's own storage buffer of this label; ``make`` gives its contents on first use."""
         made = self._owned(
             label,
-            (size, element, usage),
-            lambda name: self.gpu.buffer(name, size, owner=self.owner, element=element, usage=usage),
+            element,
+            lambda name: self.gpu.buffer(name, make(), owner=self.owner, element=element),
         )
         assert isinstance(made, Buffer)
         return made

@@ -48,18 +48,12 @@ class ShadowMap(Technique):
 
     def render(self, view: View, content: Sequence[Any]) -> Visibility:
         """Draw all maps. ``content`` are the kinds of scene content, each with ``draw_depth``."""
-        layers = light_layers(view.scene, self.size)
-        count = max(1, len(layers))
+        count = sum(layer_count(light) for light in view.scene.lights)
         maps = view.texture(
-            "maps", (self.size, self.size, count), "depth32float", dimension="2d-array", usage="sampled target"
+            "maps", (self.size, self.size, max(1, count)), "depth32float", dimension="2d-array", usage="sampled target"
         )
-        rows = np.zeros(count, view.gpu.dtype(_LAYER))
-        for row, layer in zip(rows, layers, strict=False):
-            row["view_proj"], row["inverse"] = layer.matrix.T, np.linalg.inv(layer.matrix).T
-            row["texel"], row["perspective"] = layer.texel, layer.perspective
-        table = view.buffer("layers", rows.nbytes, element=_LAYER)
-        view.gpu.write(table, rows)
-        for index in range(len(layers)):
+        table = view.buffer("layers", lambda: self._layer_rows(view), element=_LAYER)
+        for index in range(count):
             scope = {"shadow_layers": table, "layer": view.gpu.constant(index)}
             with view.gpu.render(view.owner, depth=(maps.view(layer=index), 0.0)) as native:
                 for kind in content:
@@ -73,6 +67,14 @@ class ShadowMap(Technique):
                 "shadow_params": view.params,
             },
         )
+
+    def _layer_rows(self, view: View) -> NDArray[Any]:
+        layers = light_layers(view.scene, self.size)
+        rows = np.zeros(max(1, len(layers)), view.gpu.dtype(_LAYER))
+        for row, layer in zip(rows, layers, strict=False):
+            row["view_proj"], row["inverse"] = layer.matrix.T, np.linalg.inv(layer.matrix).T
+            row["texel"], row["perspective"] = layer.texel, layer.perspective
+        return rows
 
 
 @dataclass(frozen=True, eq=False)
