@@ -10,9 +10,10 @@ pyramid = ty.Mesh(corners[sides].reshape(-1, 3), np.arange(12).reshape(-1, 3), m
 ground = ty.Mesh(corners[:4] * 8, np.array([(0, 2, 1), (0, 3, 2)]))
 scene = ty.Scene(
     instances=(ty.Instance(pyramid), ty.Instance(ground)),
-    lights=(ty.SpotLight(position=(3, 5, 2), direction=(-3, -5, -2), intensity=400, outer_angle=0.35),),
+    lights=(ty.SpotLight(position=(3, 5, 2), direction=(-3, -5, -2), intensity=900, outer_angle=0.35),),
     camera=ty.Camera(position=(0, 1.6, 7), target=(0, 1, 0)),
-    medium=ty.Medium(scattering=(0.02, 0.03, 0.05), phase=ty.HenyeyGreenstein(0.5)),
+    medium=ty.Medium(scattering=(0.04, 0.06, 0.1), phase=ty.HenyeyGreenstein(0.5)),
+    ambient=(0.02, 0.03, 0.04),
     name="pyramid",
 )
 ty.save(scene, "pyramid.json")
