@@ -165,11 +165,11 @@ class Meshes:
 
     # --- drawing --------------------------------------------------------------------------------------------------
 
-    def draw_gbuffer(self, native_pass: Any, scope: Mapping[str, Any]) -> None:
+    def draw_gbuffer(self, native_pass: Any, scope: Mapping[str, Bound]) -> None:
         """Draw into the G-buffer; ``scope`` binds ``camera``."""
         self._replay(native_pass, "gbuffer", scope, "back")
 
-    def draw_depth(self, native_pass: Any, scope: Mapping[str, Any], cull: Literal["none", "front", "back"]) -> None:
+    def draw_depth(self, native_pass: Any, scope: Mapping[str, Bound], cull: Literal["none", "front", "back"]) -> None:
         """Draw depth from a light; ``scope`` binds ``shadow_layers`` and ``layer``.
 
         Args:
@@ -177,12 +177,12 @@ class Meshes:
         """
         self._replay(native_pass, "depth", scope, cull)
 
-    def _replay(self, native_pass: Any, kind: str, scope: Mapping[str, Any], cull: str) -> None:
+    def _replay(self, native_pass: Any, kind: str, scope: Mapping[str, Bound], cull: str) -> None:
         if not self._draws:
             return
         names = ("camera",) if kind == "gbuffer" else ("shadow_layers", "layer")
         bound = {name: scope[name] for name in names}
-        key = (kind, cull, tuple(b.key if isinstance(b, Bound) else id(b) for b in bound.values()))
+        key = (kind, cull, tuple(b.key for b in bound.values()))
         if key not in self._bundles:
             self._bundles[key] = self._record(kind, bound, cull)
         native_pass.execute_bundles([self._bundles[key]])
@@ -212,9 +212,7 @@ class Meshes:
                 state, vertex, fragment = _MASKED_DEPTH, "depth_vertex", "depth_fragment"
             else:
                 state, vertex, fragment = _SOLID_DEPTH, "solid_depth_vertex", None
-            pipeline, group = gpu.raster(
-                MODULE, replace(state, cull=faces), bindings, vertex=vertex, fragment=fragment
-            )
+            pipeline, group = gpu.raster(MODULE, replace(state, cull=faces), bindings, vertex=vertex, fragment=fragment)
             if pipeline is not current:
                 bundle.set_pipeline(pipeline)
                 current = pipeline

@@ -52,7 +52,7 @@ class ShadowMap(Technique):
         maps = view.texture(
             "maps", (self.size, self.size, max(1, count)), "depth32float", dimension="2d-array", usage="sampled target"
         )
-        table = view.buffer("layers", lambda: self._layer_rows(view), element=_LAYER)
+        table = view.buffer("layers", lambda: self._layer_rows(view), element=_LAYER).read()
         for index in range(count):
             scope = {"shadow_layers": table, "layer": view.gpu.constant(index)}
             with view.gpu.render(view.owner, depth=(maps.view(layer=index), 0.0)) as native:
@@ -66,6 +66,7 @@ class ShadowMap(Technique):
                 "shadow_sampler": view.gpu.sampler(compare="greater-equal"),
                 "shadow_params": view.params,
             },
+            maps,
         )
 
     def _layer_rows(self, view: View) -> NDArray[Any]:

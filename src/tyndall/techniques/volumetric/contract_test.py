@@ -1,7 +1,8 @@
 """What every volumetric technique must get right, whatever its method.
 
-Each test runs on all members of the family; a technique is covered by being listed. Where a method cannot do what a test
-asks, the reason stands in :data:`BLIND`; where it needs certain parameters to be exact at this size, in :data:`SETTINGS`.
+Each test runs on all members of the family; a technique is covered by being listed. Where a method cannot do what a
+test asks, the reason stands in :data:`BLIND`; where it needs certain parameters to be exact at this size, in
+:data:`SETTINGS`.
 """
 
 from __future__ import annotations
@@ -190,7 +191,7 @@ def half_lit(dark: str) -> Scene:
 @pytest.mark.parametrize("name", seeing("off screen"))
 @pytest.mark.parametrize("dark", ["near", "far"])
 def test_light_of_one_half_of_the_ray(gpu: Gpu, name: str, dark: str) -> None:
-    """Catches an accumulation that attenuates the wrong side, and a camera's own side of the shadow that is forgotten."""
+    """Catches an accumulation that attenuates the wrong side, and a camera in shadow that is taken for lit."""
     scene = half_lit(dark)
     shot = shoot(gpu, scene, volumetric=make(name), shadow=ShadowMap(size=1024))
     stretch = props.rays(NARROW, TINY).stretch
@@ -253,7 +254,7 @@ def test_slits_agree_with_the_march(gpu: Gpu, name: str, tolerance: float, side:
     direction = (0.3, -0.4, 0.9) if side == "ahead" else (0.6, -0.3, -0.7)
     boards = props.slits(-3 if side == "ahead" else 1, 2.5, 0.4, 5)
     scene = Scene(
-        boards if side == "ahead" else [*boards, props.wall(-6, 3)],
+        boards if side == "ahead" else [*boards, props.wall(-6, 6)],
         [DirectionalLight(direction, 1.0)],
         Camera((0.4, 0.3, 0), (0, 0, -3), fov=0.9, near=0.05),
         Medium(0.15, 0.05, HenyeyGreenstein(0.4)),
@@ -297,14 +298,14 @@ NEAR_LIGHTS = [
 @pytest.mark.parametrize("name", LIT)
 def test_near_lights_against_quadrature(gpu: Gpu, name: str, light: PointLight | SpotLight) -> None:
     scene = Scene([props.wall(-6)], [light], AHEAD, AIR)
-    try:
-        shot = shoot(gpu, scene, volumetric=make(name))
-    except Unsupported as error:
-        assert "\n" not in str(error)
-        assert name in str(error)
-        assert light.kind in str(error)
+    supports = getattr(make(name), "supports", None)
+    if supports is not None:
+        with pytest.raises(Unsupported, match=rf"{name} .*{light.kind} light: use ") as refused:
+            shoot(gpu, scene, volumetric=make(name))
+        assert "\n" not in str(refused.value)
         assert gpu.ledger.by_owner().keys() <= {"constants"}, "a refusal leaves nothing on the device"
         return
+    shot = shoot(gpu, scene, volumetric=make(name))
     seen = props.rays(AHEAD, TINY)
     expected = props.quadrature(scene, light, TINY, 0, 6 * seen.stretch)
     way = np.array(light.position)
