@@ -11,7 +11,6 @@ import errno
 import json
 import os
 import sys
-import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Literal
@@ -266,8 +265,6 @@ def main(words: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if words is None else words) or ["--help"]
     debug = "--debug" in words
     words = [word for word in words if word != "--debug"]
-    # Without it, Mesa's OpenGL adapter writes a line to stderr each time that adapters are listed.
-    os.environ.setdefault("XDG_RUNTIME_DIR", tempfile.gettempdir())
     try:
         rest, flags = arguments.split_flags(words)
         code = app(rest, prog_name="tyndall", standalone_mode=False, obj=flags)
