@@ -84,6 +84,9 @@ def adapters() -> list[wgpu.GPUAdapter]:
 
     OpenGL is left out: it has no float targets and too few storage bindings for the frame.
     """
+    if sys.platform == "linux":
+        # Without a desktop session Mesa's Wayland probe complains on stderr about the missing variable.
+        os.environ.setdefault("XDG_RUNTIME_DIR", tempfile.gettempdir())
     found = [a for a in wgpu.gpu.enumerate_adapters_sync() if a.info["backend_type"] in _BACKENDS]
     return sorted(found, key=lambda a: _RANK_TYPE.get(a.info["adapter_type"], 3))
 
