@@ -472,6 +472,8 @@ class _Reader:
             if not np.array_equal(matrix[3], (0, 0, 0, 1)):
                 node.stop("matrix: its last row is not 0, 0, 0, 1")
             return matrix
+        if not node.value.keys() & {"translation", "rotation", "scale"}:
+            return np.eye(4)
         rotation = np.array(node.numbers("rotation", (0.0, 0.0, 0.0, 1.0)))
         if not rotation.any():
             node.stop("rotation: (0, 0, 0, 0) is no rotation")

@@ -1,14 +1,14 @@
 """STL, ASCII and binary (3D Systems, "StereoLithography interface specification", 1989).
 
-An STL is a list of separate triangles, so a facet is flat: its normal is that of its plane (the file's own normals are
-often wrong and are not read), and corners are welded where both position and normal are the same bits.
+An STL is a list of separate triangles, so a facet is flat: its normal is that of its plane (the file's own normals
+are often wrong and are not read). Corners are welded where both position and normal are the same bits, which saves memory
+on the flat faces of a machine part; above a million triangles, a scan, there is little to weld, and it is not tried.
 """
 
 from __future__ import annotations
 
 import warnings
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,7 @@ from tyndall.scene.files.source import check_positions, first_line, map_bytes, p
 from tyndall.scene.model import Instance, Mesh, Scene
 
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+_MOST_WELDED = 1_000_000
 _HEADER = 84  # 80 bytes of comment, then the count
 
 
@@ -55,9 +56,11 @@ def _binary(path: Path, data: NDArray[np.uint8]) -> NDArray[np.float32]:
 
 def _ascii(path: Path, data: bytes) -> NDArray[np.float64]:
     text = data.lower()
-    if b"endsolid" not in text:
+    end = text.rfind(b"endsolid")
+    if end < 0:
         warnings.warn(f"{path}: has no endsolid and may be truncated", SceneWarning, stacklevel=2)
-    pieces = text[max(text.find(b"facet"), 0) :].split(b"vertex")[1:]  # the solid's name may hold the word, too
+        end = len(text)
+    pieces = text[max(text.find(b"facet"), 0) : end].split(b"vertex")[1:]  # the solid's name may hold the word, too
     rows = [piece.split(None, 3)[:3] for piece in pieces]
     numbers = parse_numbers(b" ".join(word for row in rows for word in row))
     if numbers is None or len(numbers) != 3 * len(rows):
@@ -84,13 +87,16 @@ def flat_mesh(corners: NDArray[np.float32], name: str) -> Mesh:
     normals = np.cross(b - a, c - a)
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     normals = np.where(length > 0, normals / np.where(length > 0, length, 1), (0.0, 1.0, 0.0))
-    rows = np.concatenate([corners, np.repeat(normals.astype(np.float32) + np.float32(0), 3, axis=0)], axis=1)
-    _, vertex, indices = _unique_rows(rows)
+    directions = np.repeat(normals.astype(np.float32) + np.float32(0), 3, axis=0)
+    if len(corners) > 3 * _MOST_WELDED:
+        return Mesh(corners, np.arange(len(corners), dtype=np.uint32).reshape(-1, 3), directions, name=name)
+    rows = np.concatenate([corners, directions], axis=1)
+    vertex, indices = _unique_rows(rows)
     return Mesh(rows[vertex, :3], indices.reshape(-1, 3).astype(np.uint32), rows[vertex, 3:], name=name)
 
 
-def _unique_rows(rows: NDArray[np.float32]) -> tuple[NDArray[Any], NDArray[np.int64], NDArray[np.int64]]:
-    """What ``np.unique(axis=0)`` gives, with its indices, by sorting a 64-bit hash, which is many times faster."""
+def _unique_rows(rows: NDArray[np.float32]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Where each different row is first, and which of them each row is; by a hash, much faster than ``axis=0``."""
     bits = np.ascontiguousarray(rows).view(np.uint32).astype(np.uint64)
     key = np.zeros(len(rows), np.uint64)
     for column in bits.T:
@@ -99,4 +105,4 @@ def _unique_rows(rows: NDArray[np.float32]) -> tuple[NDArray[Any], NDArray[np.in
     _, first, inverse = np.unique(key, return_index=True, return_inverse=True)
     if (bits[first[inverse]] != bits).any():  # two rows with one hash
         _, first, inverse = np.unique(rows, axis=0, return_index=True, return_inverse=True)
-    return rows[first], first, inverse.reshape(-1)
+    return first, inverse.reshape(-1)
