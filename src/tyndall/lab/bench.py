@@ -34,7 +34,7 @@ from tyndall.lab.fingerprint import scene_hash, versions
 from tyndall.lab.measure import Measurement, measure
 from tyndall.lab.picture import write_atomically
 from tyndall.lab.reference import Reference, find
-from tyndall.lab.stage import Overrides, Stage, describe, make
+from tyndall.lab.stage import Overrides, Stage, adapter_name, describe, driver_name, make
 from tyndall.scene import bundled
 from tyndall.scene.model import Scene
 from tyndall.techniques.contract import Technique
@@ -189,14 +189,13 @@ class _Run:
 
     def head(self) -> dict[str, Any]:
         """What every figure depends on."""
-        with self._stage(self._scene(self.settings.scenes[0])) as stage:
-            adapter, driver = stage.adapter, stage.driver
         s = self.settings
         return {
             "benchmark": "volumetric",
             "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
-            "adapter": adapter,
-            "driver": driver,
+            "adapter": adapter_name(self.gpu),
+            "adapter_type": str(self.gpu.adapter_info["adapter_type"]),
+            "driver": driver_name(self.gpu),
             "versions": versions(),
             "settings": {
                 "size": list(s.size),

@@ -7,7 +7,7 @@ the trend, not a race.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 # S1, table 6: frames per second on an RTX 4060 Laptop, by this project's scene of the same character.
@@ -31,12 +31,91 @@ def markdown(document: Mapping[str, Any]) -> str:
     """All tables of a benchmark's document, or of as many parts as it has yet."""
     parts = [_head(document)]
     if "scenes" in document:
+        if document["adapter_type"] != "CPU" and document["settings"]["size"] == [2134, 1459]:
+            parts.append(_goals(document))
         parts += [_scenes(document), _memory(document)]
     if "lights" in document:
         parts.append(_lights(document))
     if "resolution" in document:
         parts += [_resolution(name, found) for name, found in document["resolution"].items()]
     return "\n\n".join(parts) + "\n"
+
+
+def comparison(document: Mapping[str, Any]) -> str:
+    """The table of a ``results.json`` of ``tyndall compare``."""
+    truth = document["reference"]
+    width, height = document["size"]
+    head = f"**{document['scene']}** ({document['triangles']:,} triangles), {width}×{height}, {document['adapter']}."
+    if truth:
+        head += (
+            f" Reference: {truth['technique']}, {truth['steps']} steps; "
+            f"twice as many change `L_v` by {_percent(truth['change_on_doubling'])}."
+        )
+    rows = []
+    for row in document["results"]:
+        error = row["error"] or {"rel_rmse": None, "bias": None, "psnr": None}
+        psnr = error["psnr"]
+        rows.append(
+            [
+                row["technique"] + (" (paper)" if row["model"] == "paper" else ""),
+                *(_ms(row["gpu_ms"][key]) for key in ("median", "min", "p95")),
+                _mib(row["memory_bytes"]),
+                _percent(error["rel_rmse"]),
+                _percent(error["bias"], "+"),
+                f"{psnr:.1f}" if psnr is not None else "–",
+            ]
+        )
+    heading = ["technique", "GPU ms", "min", "p95", "MiB", "rel. RMSE", "bias", "PSNR dB"]
+    return f"{head}\n\n{_table(heading, rows)}\n"
+
+
+def splice(page: str, name: str, text: str) -> str:
+    """``page`` with what is between ``<!-- name -->`` and ``<!-- /name -->`` replaced by ``text``.
+
+    Raises:
+        ValueError: the page has no such place.
+    """
+    begin, end = f"<!-- {name} -->", f"<!-- /{name} -->"
+    before, found, rest = page.partition(begin)
+    _, closed, after = rest.partition(end)
+    if not (found and closed):
+        raise ValueError(f"the page has no place '{name}'")
+    return f"{before}{begin}\n\n{text.strip()}\n\n{end}{after}"
+
+
+def _goals(document: Mapping[str, Any]) -> str:
+    """The project's own goals at S1's settings, each against the worst of what was measured."""
+    scenes = document["scenes"]
+
+    def worst(technique: str | None, figure: Callable[[Mapping[str, Any]], float]) -> float:
+        return max(figure(row) for row in scenes if technique in (None, row["technique"]))
+
+    def time(row: Mapping[str, Any]) -> float:
+        return float(row["gpu_ms"]["median"])
+
+    def size(row: Mapping[str, Any]) -> float:
+        return float(row["memory_bytes"])
+
+    goals = [
+        ("froxel, GPU time", worst("froxel", time), 0.15, "ms"),
+        ("screen space, GPU time", worst("screen_space", time), 0.25, "ms"),
+        ("polygonal, GPU time", worst("polygonal", time), 6.0, "ms"),
+        ("froxel, memory", worst("froxel", size) / 2**20, 36.0, "MiB"),
+        (
+            "polygonal, memory with its shadow map",
+            worst("polygonal", lambda row: float(row["memory_bytes"] + row["shadow_bytes"])) / 2**20,
+            8.0,
+            "MiB",
+        ),
+        ("screen space, memory but for its parameters", worst("screen_space", size) // 1024, 0.0, "KiB"),
+        ("host time of a frame", worst(None, lambda row: float(row["host_ms"]["median"])), 3.0, "ms"),
+    ]
+    rows = [
+        [what, f"{found:.3f} {unit}", f"{goal:g} {unit}", "yes" if found <= goal else "**no**"]
+        for what, found, goal, unit in goals
+    ]
+    text = "The slowest scene, or the largest memory, of those below."
+    return f"### Goals\n\n{text}\n\n{_table(['what', 'measured', 'at most', 'met'], rows)}"
 
 
 def _head(document: Mapping[str, Any]) -> str:

@@ -54,6 +54,17 @@ def describe(technique: Technique) -> dict[str, Any]:
     return {"technique": technique.name, **values}
 
 
+def adapter_name(gpu: Gpu) -> str:
+    """As its driver gives it."""
+    return str(gpu.adapter_info["device"])
+
+
+def driver_name(gpu: Gpu) -> str:
+    """The driver, and the interface it is reached through."""
+    info = gpu.adapter_info
+    return f"{info['description']} ({info['backend_type']})".strip()
+
+
 class Stage:
     """See the module.
 
@@ -103,13 +114,12 @@ class Stage:
     @property
     def adapter(self) -> str:
         """The adapter's name, as its driver gives it."""
-        return str(self.gpu.adapter_info["device"])
+        return adapter_name(self.gpu)
 
     @property
     def driver(self) -> str:
         """The driver and the interface it is reached through."""
-        info = self.gpu.adapter_info
-        return f"{info['description']} ({info['backend_type']})".strip()
+        return driver_name(self.gpu)
 
     def use(self, volumetric: Technique, *, still: bool = False) -> Renderer:
         """The renderer with a volumetric technique, at its first frame; ``still`` leaves antialiasing out.
