@@ -85,7 +85,7 @@ def adapters() -> list[wgpu.GPUAdapter]:
     OpenGL is left out: it has no float targets and too few storage bindings for the frame.
     """
     if sys.platform == "linux":
-        # Without a desktop session Mesa's Wayland probe complains on stderr about the missing variable.
+        # Where there is no desktop session the loader complains on stderr about the missing variable.
         os.environ.setdefault("XDG_RUNTIME_DIR", tempfile.gettempdir())
     found = [a for a in wgpu.gpu.enumerate_adapters_sync() if a.info["backend_type"] in _BACKENDS]
     return sorted(found, key=lambda a: _RANK_TYPE.get(a.info["adapter_type"], 3))
@@ -140,6 +140,7 @@ class Raster:
         targets: colour formats with their blending, in order of ``@location``.
         depth: depth format, or None.
         depth_compare: reversed-Z draws what is "greater".
+        depth_bias, depth_slope_bias: added to the depth, in its smallest steps and per slope; triangles only.
         cull: "none", "front" or "back"; front faces are counter-clockwise.
         vertex_buffers: per buffer, (stride, ((shader location, format, offset), …)).
     """
@@ -148,6 +149,8 @@ class Raster:
     depth: str | None = None
     depth_compare: str = "greater"
     depth_write: bool = True
+    depth_bias: int = 0
+    depth_slope_bias: float = 0.0
     cull: str = "none"
     topology: str = "triangle-list"
     vertex_buffers: tuple[tuple[int, tuple[tuple[int, str, int], ...]], ...] = ()
@@ -218,13 +221,16 @@ class Gpu:
             data: texels of the first mip level, C-contiguous, rows first.
 
         Raises:
-            GpuError: beyond the adapter's limits.
+            GpuError: beyond the adapter's limits or memory.
         """
         width, height, depth = (*size, 1)[:3] if len(size) == 2 else size
         limit = self.limits["max-texture-dimension-3d" if dimension == "3d" else "max-texture-dimension-2d"]
         layers = self.limits["max-texture-array-layers"]
-        if max(width, height) > limit or (dimension == "3d" and depth > limit) or (dimension != "3d" and depth > layers):
-            raise GpuError(f"{label}: {width}×{height}×{depth} texels; this adapter's limit is {limit}")
+        asked = f"{label}: {width}×{height}×{depth} texels"
+        if max(width, height) > limit or (dimension == "3d" and depth > limit):
+            raise GpuError(f"{asked}; this adapter's limit is {limit}")
+        if dimension != "3d" and depth > layers:
+            raise GpuError(f"{asked}; this adapter's limit is {layers} layers")
         flags = {
             "sampled": wgpu.TextureUsage.TEXTURE_BINDING,
             "storage": wgpu.TextureUsage.STORAGE_BINDING,
@@ -233,14 +239,17 @@ class Gpu:
         bits = wgpu.TextureUsage.COPY_SRC | wgpu.TextureUsage.COPY_DST
         for word in usage.split():
             bits |= flags[word]
-        native = self.device.create_texture(
-            label=label,
-            size=(width, height, depth),
-            format=format,
-            usage=bits,
-            dimension="3d" if dimension == "3d" else "2d",
-            mip_level_count=mips,
-        )
+        try:
+            native = self.device.create_texture(
+                label=label,
+                size=(width, height, depth),
+                format=format,
+                usage=bits,
+                dimension="3d" if dimension == "3d" else "2d",
+                mip_level_count=mips,
+            )
+        except wgpu.GPUError as error:
+            raise GpuError(f"{asked}: {_cause(error)}") from None
         bytes_ = 0
         for level in range(mips):
             w, h = max(1, width >> level), max(1, height >> level)
@@ -279,7 +288,7 @@ class Gpu:
             usage: words of "storage", "uniform", "vertex", "index", "indirect"; copies are always allowed.
 
         Raises:
-            GpuError: larger than the adapter allows.
+            GpuError: larger than the adapter allows, or than its memory.
         """
         size = data if isinstance(data, int) else data.nbytes
         size = max(16, -(-size // 4) * 4)
@@ -288,7 +297,10 @@ class Gpu:
         bits = wgpu.BufferUsage.COPY_SRC | wgpu.BufferUsage.COPY_DST
         for word in usage.split():
             bits |= getattr(wgpu.BufferUsage, word.upper())
-        native = self.device.create_buffer(label=label, size=size, usage=bits)
+        try:
+            native = self.device.create_buffer(label=label, size=size, usage=bits)
+        except wgpu.GPUError as error:
+            raise GpuError(f"{label}: {size} bytes: {_cause(error)}") from None
         result = Buffer(self.ledger, owner, label, size, native)
         result.element = element
         if "::" in element:
@@ -716,8 +728,15 @@ def _raster_descriptor(
             "format": state.depth,
             "depth_write_enabled": state.depth_write,
             "depth_compare": state.depth_compare,
+            "depth_bias": state.depth_bias,
+            "depth_bias_slope_scale": state.depth_slope_bias,
         }
     return descriptor
+
+
+def _cause(error: Exception) -> str:
+    """The innermost line of the driver's report, such as "Not enough memory left."."""
+    return str(error).strip().splitlines()[-1].strip()
 
 
 def _timestamp_period(device: wgpu.GPUDevice) -> float:

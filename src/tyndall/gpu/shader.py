@@ -29,7 +29,9 @@ _USED = re.compile(r"@group\(0\)\s*@binding\((\d+)\)")
 _VIRTUAL_IMPORT = re.compile(r"import\s+(package::(?:bindings|visibility))::(\{[^}]*\}|\w+)\s*;")
 _ATTRIBUTE = re.compile(r"@\w+(?:\([^)]*\))?\s*")
 _DECLARATION = re.compile(r"(?:fn|struct|const|override|var(?:<[^>]*>)?)\s+(\w+)")
-_DRIVER_POSITION = re.compile(r"wgsl:(\d+):(\d+)")
+# A line number of the driver's report: in its heading "┌─ label:6:1", or beside the quoted line whose part it underlines.
+_DRIVER_HEADING = re.compile(r"┌─ .*:(\d+):\d+$", re.MULTILINE)
+_DRIVER_MARKED = re.compile(r"^\s*(\d+) │.*\n\s*│[ │]*\^", re.MULTILINE)
 
 
 class ShaderError(RuntimeError):
@@ -163,7 +165,7 @@ def create_module(
         return device.create_shader_module(label=label, code=linked.wgsl)
     except (wgpu.GPUError, RuntimeError) as error:
         text = str(error)
-        position = _DRIVER_POSITION.search(text)
+        position = _DRIVER_MARKED.search(text) or _DRIVER_HEADING.search(text)
         where = linker.locate(linked, int(position.group(1))) if position else f"{label}:1:1"
         detail = [line.strip() for line in text.splitlines() if line.strip()]
         raise ShaderError(f"{where}: " + "\n".join(detail)) from None
