@@ -1,8 +1,8 @@
-"""Scenes that come with Tyndall, modelled by formulas: nothing is downloaded, and a seed gives the same bits every time.
+"""Scenes that come with Tyndall, modelled by formulas: nothing is downloaded, and a seed gives the same bits each time.
 
-Each has the character and the exact triangle count of a scene of S1's comparison of volumetric techniques (*Bunny Box*,
-*Classroom*, *San Miguel*), a camera, a light that makes shafts, a medium, and in ``looks`` the parameters that S1 gives its
-techniques in that scene.
+Each has the character and the exact triangle count of a scene of S1's comparison of volumetric techniques (*Bunny
+Box*, *Classroom*, *San Miguel*), a camera, a light that makes shafts, a medium, and in ``looks`` the parameters that
+S1 gives its techniques in that scene.
 
 >>> from tyndall.scene import bundled
 >>> bundled.SCENES["box"](lights=3).triangle_count == bundled.TRIANGLES["box"]

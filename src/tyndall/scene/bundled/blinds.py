@@ -1,8 +1,8 @@
 """`blinds`: a classroom in the late afternoon; the sun falls through Venetian blinds in thin slanted sheets.
 
-Room: 7 m wide (x; the windows are in the wall x = 0), 3.2 m high, 7.5 m long (z; the blackboard hangs on the wall z = 0).
-Three windows with 23 slats each, the middle blind half raised. The sun stands 33° high and shines a little towards the
-camera, into the lobe of a forward-scattering medium. 607,402 triangles.
+Room: 7 m wide (x; the windows are in the wall x = 0), 3.2 m high, 7.5 m long (z; the blackboard hangs on the wall
+z = 0). Three windows with 23 slats each, the middle blind half raised. The sun stands 31° high and shines a little
+towards the camera, into the lobe of a forward-scattering medium. 607,402 triangles.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ from tyndall.scene.bundled.primitives import (
     plate,
     refine,
     repeat,
+    ribbon_solid,
     rotation,
     rounded_box,
-    sheet,
     smooth_path,
     translation,
     tube,
@@ -112,24 +112,10 @@ def _blind(width: float, raised: float) -> Geometry:
 
     A slat is a curved aluminium strip, sagging by a millimetre between its cords.
     """
-    steps, around = 40, 12
-    z = np.linspace(0.02, width - 0.02, steps + 1)
-    t = np.linspace(-1, 1, around // 2)
-    x = np.concatenate([t, t[::-1]]) * SLAT_DEPTH / 2
-    crown = 0.006 * (1 - t**2)
-    y = np.concatenate([crown, crown[::-1] - 0.0025])
-    y[around // 2 - 1], y[-1] = y[around // 2 - 1] + 0.0003, y[-1] - 0.0003
-    ring = np.stack([x, y], 1)[::-1]
-    points = np.zeros((steps + 1, around, 3))
-    points[..., :2] = ring
-    points[..., 1] -= 0.001 * np.sin(z / width * 3 * math.pi)[:, None] ** 2
-    points[..., 2] = z[:, None]
-    middle = points.mean(axis=1, keepdims=True)
-    caps = [
-        sheet(np.concatenate([np.broadcast_to(middle[:1], (1, around, 3)), points[:1]]), wrap=True),
-        sheet(np.concatenate([points[-1:], np.broadcast_to(middle[-1:], (1, around, 3))]), wrap=True),
-    ]
-    slat = merge([sheet(points, wrap=True), *caps])
+    z = np.linspace(width - 0.02, 0.02, 41)[:, None]
+    t = np.linspace(-1, 1, 6)[None]
+    sag = 0.001 * np.sin(z / width * 3 * math.pi) ** 2
+    slat = plate(np.stack([SLAT_DEPTH / 2 * t + 0 * z, 0.006 * (1 - t**2) - sag, z + 0 * t], -1), 0.002)
     top = HEAD - 0.09
     hanging = max(1, round(SLATS * (1 - raised)))
     heights = top - SLAT_PITCH * np.arange(hanging)
@@ -171,8 +157,8 @@ def _chair() -> tuple[Geometry, Geometry]:
     for side in (-1, 1):
         x = side * 0.175
         line = [
-            (x * 1.12, 0.012, -0.2), (x * 1.02, 0.25, -0.185), (x, seat - 0.035, -0.165), (x, seat - 0.02, -0.12),
-            (x, seat - 0.02, 0.1), (x, seat, 0.165), (x, 0.6, 0.185), (x, 0.84, 0.24),
+            (x * 1.12, 0.012, -0.2), (x * 1.02, 0.25, -0.185), (x, seat - 0.07, -0.17), (x, seat - 0.02, -0.12),
+            (x, seat - 0.02, 0.09), (x, seat + 0.03, 0.165), (x, 0.6, 0.185), (x, 0.84, 0.24),
         ]  # fmt: skip
         frame.append(tube(smooth_path(line, 14), 0.011, 12))
         back = [(x * 1.15, 0.012, 0.26), (x * 1.05, 0.22, 0.2), (x, seat - 0.04, 0.11)]
@@ -205,8 +191,8 @@ def _desk() -> tuple[Geometry, Geometry]:
     for side in (-1, 1):
         x = side * 0.315
         line = [
-            (x, 0.014, 0.2), (x, 0.35, 0.2), (x, top - 0.06, 0.2), (x, top - 0.036, 0.175), (x, top - 0.036, -0.175),
-            (x, top - 0.06, -0.2), (x, 0.35, -0.2), (x, 0.014, -0.2),
+            (x, 0.014, 0.2), (x, 0.35, 0.2), (x, top - 0.095, 0.2), (x, top - 0.036, 0.14), (x, top - 0.036, -0.14),
+            (x, top - 0.095, -0.2), (x, 0.35, -0.2), (x, 0.014, -0.2),
         ]  # fmt: skip
         frame.append(tube(smooth_path(line, 14), 0.013, 12))
         for z in (-0.2, 0.2):
@@ -230,17 +216,9 @@ def _book() -> Geometry:
     cover = 0.06
     outer = np.stack([0.06 - 0.06 * np.cos(angle), 0.5 + 0.5 * np.sin(angle)], 1)
     inner = np.stack([0.06 + cover - 0.06 * np.cos(angle), 0.5 + (0.5 - cover) * np.sin(angle)], 1)
-    strip = np.concatenate([[[[1, 0], [1, cover]]], np.stack([outer, inner], 1), [[[1, 1], [1, 1 - cover]]]])
-    # Lower boundary is the outside: walk it so that the strip's upper side is inside.
-    rows = [np.stack([strip[:, 0, 0], strip[:, 0, 1], np.full(len(strip), z)], 1) for z in (0.0, 1.0)]
-    inside = [np.stack([strip[:, 1, 0], strip[:, 1, 1], np.full(len(strip), z)], 1) for z in (0.0, 1.0)]
-    ring = [rows[0], rows[1], inside[1], inside[0], rows[0]]
-    hull = merge([sheet(np.stack([b, a])) for a, b in zip(ring[:-1], ring[1:], strict=True)])
-    lip = [
-        flat([strip[0, 0].tolist() + [0], strip[0, 1].tolist() + [0], strip[0, 1].tolist() + [1], strip[0, 0].tolist() + [1]], (1, 0, 0)),
-        flat([strip[-1, 0].tolist() + [1], strip[-1, 1].tolist() + [1], strip[-1, 1].tolist() + [0], strip[-1, 0].tolist() + [0]], (1, 0, 0)),
-    ]  # fmt: skip
-    cover_part = merge([hull, *lip]).retextured((0.0, 0.5), (0.0, 0.0))
+    # From the edge of the lower board around the spine: the outside is to the left, as a ribbon's upper side is.
+    strip = np.concatenate([[[[1, cover], [1, 0]]], np.stack([inner, outer], 1), [[[1, 1 - cover], [1, 1]]]])
+    cover_part = ribbon_solid(strip, 1.0).retextured((0.0, 0.5), (0.0, 0.0))
     pages = cuboid((0.07, cover * 0.6, 0.025), (0.97, 1 - cover * 0.6, 0.975)).retextured((0.5, 0.5), (0.0, 0.0))
     return merge([cover_part, pages])
 
@@ -290,11 +268,10 @@ def _lying_books(rng: np.random.Generator) -> Matrix:
     spots = [(x, z) for x in COLUMNS for z in ROWS]
     chosen = rng.permutation(len(spots))[:13]
     stacks = [
-        (spots[i][0] + rng.uniform(-0.2, 0.05), 0.74, spots[i][1] + rng.uniform(-0.15, 0.0), rng.integers(1, 5))
+        (spots[i][0] + rng.uniform(-0.2, 0.05), 0.74, spots[i][1] + rng.uniform(-0.15, 0.0), int(rng.integers(1, 5)))
         for i in chosen
     ]
-    stacks.append((5.05, 0.78, 1.0, 6))
-    stacks.append((4.45, 0.78, 1.25, 2))
+    stacks += [(5.05, 0.78, 1.0, 6), (4.45, 0.78, 1.25, 2)]
     for x, y, z, count in stacks:
         turn = rng.uniform(-0.5, 0.5)
         for _ in range(count):
@@ -339,11 +316,11 @@ def _radiator(length: float) -> Geometry:
     """A cast-iron radiator of rounded sections along z, from z = 0, against the wall x = 0."""
     pitch = 0.062
     count = int(length / pitch)
-    t = np.linspace(0, 2 * math.pi, 44, endpoint=False)
-    power = 0.35
-    x = np.sign(np.cos(t)) * np.abs(np.cos(t)) ** power * 0.05
-    y = np.sign(np.sin(t)) * np.abs(np.sin(t)) ** power * 0.29
-    section = tube(np.stack([x, y, 0 * t], 1), 0.021, 14, closed=True)
+    turn = np.linspace(0, math.pi, 15)
+    upper = np.stack([0.05 * np.cos(turn), 0.24 + 0.05 * np.sin(turn)], 1)
+    side = np.stack([np.full(6, -0.05), np.linspace(0.24, -0.24, 8)[1:-1]], 1)
+    loop = np.concatenate([upper, side, -upper, -side])
+    section = tube(np.concatenate([loop, np.zeros((len(loop), 1))], 1), 0.021, 14, closed=True)
     inner = tube([(0, -0.285, 0), (0, 0, 0), (0, 0.285, 0)], 0.017, 12)
     z = pitch * (np.arange(count) + 0.5)
     where = np.stack([np.full(count, 0.12), np.full(count, 0.46), z], 1)
@@ -409,7 +386,7 @@ def _plant(rng: np.random.Generator, leaves: int) -> tuple[Geometry, Geometry]:
     blades = []
     for k in range(leaves):
         heading, lean = k * 2.39996, 0.35 + 0.75 * (1 - k / leaves) + 0.2 * rng.random()
-        long = rng.uniform(0.24, 0.4)
+        long = rng.uniform(0.2, 0.31)
         rise = t * math.cos(lean * 0.6) - 0.75 * lean * t**2.2
         out = t * math.sin(lean) + 0.1 * t**2
         half = 0.02 * np.sin(math.pi * t**0.6) + 0.0015
@@ -434,7 +411,7 @@ def _plant(rng: np.random.Generator, leaves: int) -> tuple[Geometry, Geometry]:
 
 def _chalk_drawing() -> list[Floats]:
     """On the board: polar plots of Henyey–Greenstein's phase function, a beam through a slit, and a decaying curve."""
-    strokes = []
+    strokes: list[Floats] = []
     theta = np.linspace(0, 2 * math.pi, 240)
     for g, size in ((0.0, 0.16), (0.35, 0.1), (0.6, 0.042)):
         lobe = size * (1 - g * g) / (1 + g * g - 2 * g * np.cos(theta)) ** 1.5
@@ -623,7 +600,7 @@ def blinds(lights: int = 1, seed: int = 0) -> Scene:
     clock = merge([ring.placed(rotation("x", math.pi / 2)), *ticks, *hands])
     add(clock, _matte("clock rim", (0.07, 0.07, 0.075), 0.4), "clock", translation(5.35, 2.45, 0))
 
-    sills = [(0.02, SILL + 0.012, near + at) for (near, _), at in zip(WINDOWS, (1.55, 0.3, 1.6), strict=True)]
+    sills = [(0.045, SILL + 0.012, near + at) for (near, _), at in zip(WINDOWS, (1.55, 0.3, 1.6), strict=True)]
     pots = [_plant(rng, n) for n in (28, 34, 38)]
     for (pot, foliage), sill in zip(pots, sills, strict=True):
         add(pot, terracotta, "pot", translation(*sill))
@@ -647,7 +624,10 @@ def blinds(lights: int = 1, seed: int = 0) -> Scene:
         lights=suns(options.lights, SUN, 50.0, (1.0, 0.88, 0.70), (18, 55)),
         camera=Camera((2.75, 1.32, 6.9), (1.0, 1.3, 3.4), fov=math.radians(60), exposure=-0.6),
         medium=Medium(
-            0.09, 0.005, HenyeyGreenstein(0.5), ((-WALL, -WALL, -WALL), (WIDTH + WALL, HEIGHT + WALL, LENGTH + WALL))
+            (0.09,) * 3,
+            (0.005,) * 3,
+            HenyeyGreenstein(0.5),
+            ((-WALL, -WALL, -WALL), (WIDTH + WALL, HEIGHT + WALL, LENGTH + WALL)),
         ),
         background=(7.0, 8.0, 9.5),
         ambient=(1.1, 1.13, 1.2),

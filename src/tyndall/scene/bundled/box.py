@@ -1,7 +1,7 @@
-"""`box`: a fox of clay in a plaster room; the sun falls through a round opening in the ceiling and three slits in a wall.
+"""`box`: a fox of clay in a plaster room; the sun falls through a round opening in the ceiling and slits in a wall.
 
-The shaft from the ceiling meets the figure, whose shadow is then seen in the air as well as on the floor. Ceiling, walls
-and floor are closed slabs 0.3 m thick, so that no light leaks in at the edges whichever faces a shadow map draws.
+The shaft from the ceiling meets the figure, whose shadow is then seen in the air as well as on the floor. Ceiling,
+walls and floor are closed slabs 0.3 m thick, so that no light leaks in at the edges whichever faces a shadow map draws.
 Interior: 6 m wide (x), 4.2 m high, 7 m deep (z), the figure on the z axis. 4,968 triangles.
 """
 
@@ -53,17 +53,18 @@ def fox(p: NDArray[np.floating[Any]]) -> Floats:
     body = smooth_union(body, ellipsoid(p, (0, 0.52, 0.1), (0.155, 0.22, 0.13)), 0.08)
     body = smooth_union(body, limb(p, (0, 0.66, 0.05), (0, 0.88, 0.1), 0.14, 0.1), 0.08)
     body = smooth_union(body, ellipsoid(mirrored, (0.165, 0.2, -0.04), (0.115, 0.19, 0.2)), 0.05)
-    body = smooth_union(body, limb(mirrored, (0.19, 0.05, 0.0), (0.185, 0.05, 0.19), 0.055, 0.052), 0.03)
-    body = smooth_union(body, limb(mirrored, (0.09, 0.5, 0.12), (0.082, 0.07, 0.2), 0.072, 0.046), 0.04)
-    body = smooth_union(body, ellipsoid(mirrored, (0.082, 0.045, 0.235), (0.056, 0.046, 0.075)), 0.02)
+    body = smooth_union(body, limb(mirrored, (0.2, 0.05, 0.0), (0.2, 0.05, 0.19), 0.062, 0.058), 0.05)
+    body = smooth_union(body, limb(mirrored, (0.09, 0.5, 0.12), (0.085, 0.07, 0.2), 0.075, 0.054), 0.06)
+    body = smooth_union(body, ellipsoid(mirrored, (0.085, 0.045, 0.24), (0.062, 0.055, 0.08)), 0.04)
+    body = smooth_union(body, ellipsoid(p, (0.05, 0, 0), (0.36, 0.06, 0.38)), 0.04)
     head = ellipsoid(p, (0, 0.945, 0.12), (0.15, 0.128, 0.145))
     head = smooth_union(head, ellipsoid(mirrored, (0.1, 0.9, 0.13), (0.088, 0.07, 0.095)), 0.06)
-    head = smooth_union(head, limb(p, (0, 0.905, 0.2), (0, 0.875, 0.385), 0.082, 0.032), 0.05)
-    head = smooth_union(head, ellipsoid(p, (0, 0.89, 0.412), (0.03, 0.026, 0.024)), 0.012)
-    flattened = mirrored * (1, 1, 1.9)
-    ear = limb(flattened, (0.1, 1.02, 0.08 * 1.9), (0.142, 1.225, 0.06 * 1.9), 0.074, 0.012)
-    hollow = limb(mirrored, (0.105, 1.05, 0.165), (0.14, 1.2, 0.11), 0.045, 0.01)
-    ear = -smooth_union(-ear, hollow, 0.02)
+    head = smooth_union(head, limb(p, (0, 0.905, 0.2), (0, 0.877, 0.385), 0.084, 0.042), 0.05)
+    head = smooth_union(head, ellipsoid(p, (0, 0.897, 0.408), (0.038, 0.032, 0.034)), 0.02)
+    flattened = mirrored * (1, 1, 1.5)
+    ear = limb(flattened, (0.1, 1.02, 0.08 * 1.5), (0.145, 1.2, 0.06 * 1.5), 0.08, 0.03)
+    hollow = limb(mirrored, (0.105, 1.04, 0.175), (0.14, 1.17, 0.135), 0.05, 0.02)
+    ear = -smooth_union(-ear, hollow, 0.03)
     head = smooth_union(head, ear, 0.03)
     body = smooth_union(body, head, 0.05)
     joints = [
@@ -74,10 +75,10 @@ def fox(p: NDArray[np.floating[Any]]) -> Floats:
         (0.33, 0.095, 0.26),
         (0.2, 0.07, 0.37),
     ]
-    radii = (0.07, 0.085, 0.105, 0.115, 0.085, 0.02)
+    radii = (0.08, 0.095, 0.11, 0.12, 0.09, 0.045)
     bones = zip(joints[:-1], joints[1:], radii[:-1], radii[1:], strict=True)
     tail = reduce(lambda a, b: smooth_union(a, b, 0.05), (limb(p, a, b, ra, rb) for a, b, ra, rb in bones))
-    body = smooth_union(body, tail, 0.025)
+    body = smooth_union(body, tail, 0.06)
     return np.asarray(body)
 
 
@@ -138,7 +139,7 @@ def _plinth() -> Geometry:
 
 
 def box(lights: int = 1, seed: int = 0) -> Scene:
-    """A fox of clay in a plaster room: a shaft of sun from a round skylight meets it and takes its shadow through the air.
+    """A fox of clay in a plaster room: the sun from a round skylight meets it and casts its shadow through the air.
 
     Args:
         lights: 1 to 32 directional lights.
@@ -151,7 +152,9 @@ def box(lights: int = 1, seed: int = 0) -> Scene:
     rng = np.random.default_rng(options.seed)
     plaster = Material(
         "plaster", roughness=0.95, base_color=(1, 1, 1, 1),
-        base_color_texture=textures.mottled(rng, "plaster", (0.80, 0.74, 0.66), (0.90, 0.86, 0.79), beta=2.2, metres=2.5),
+        base_color_texture=textures.mottled(
+            rng, "plaster", (0.80, 0.74, 0.66), (0.90, 0.86, 0.79), beta=2.2, metres=2.5
+        ),
     )  # fmt: skip
     paved = Material(
         "floor", roughness=0.55, base_color=(1, 1, 1, 1),
@@ -176,8 +179,8 @@ def box(lights: int = 1, seed: int = 0) -> Scene:
     floor, walls = _room()
     cube = rounded_box((-0.24, 0, -0.24), (0.24, 0.48, 0.24), 0.02).at(1.75, 0, 0.3, 0.5)
     jar = lathe(
-        [(0, 0), (0.14, 0), (0.22, 0.12), (0.25, 0.27), (0.22, 0.43), (0.12, 0.54), (0.1, 0.6), (0.15, 0.68), (0.13, 0.68),
-         (0.08, 0.6), (0, 0.5)], 16
+        [(0, 0), (0.14, 0), (0.22, 0.12), (0.25, 0.27), (0.22, 0.43), (0.12, 0.54), (0.1, 0.6), (0.15, 0.68),
+         (0.13, 0.68), (0.08, 0.6), (0, 0.5)], 16
     ).at(-1.75, 0, 0.35)  # fmt: skip
     rest = {
         "floor": (floor, paved),
@@ -187,17 +190,17 @@ def box(lights: int = 1, seed: int = 0) -> Scene:
         "cube": (cube, oak),
         "jar": (jar, glaze),
     }
-    figure = surface_nets(fox, (-0.45, -0.05, -0.6), (0.65, 1.3, 0.5), 0.048)
+    figure = surface_nets(fox, (-0.45, -0.05, -0.6), (0.65, 1.3, 0.5), 0.049)
     missing = TRIANGLES - figure.triangle_count - sum(part.triangle_count for part, _ in rest.values())
     figure = refine(figure, missing, lambda points: project_onto(fox, points))
     rest["fox"] = (figure.at(0, PLINTH - 0.004, -0.15, -0.3), clay)
 
-    scene = Scene(
+    return Scene(
         instances=tuple(Instance(part.mesh(material, name), name=name) for name, (part, material) in rest.items()),
         lights=suns(options.lights, SUN, 10.0, (1.0, 0.93, 0.82), (46, 72)),
         camera=Camera((0.75, 1.3, 3.1), (-0.1, 1.45, -0.6), fov=math.radians(57), exposure=1.6),
         medium=Medium(
-            0.16, 0.01, HenyeyGreenstein(0.4),
+            (0.16,) * 3, (0.01,) * 3, HenyeyGreenstein(0.4),
             ((-WIDTH / 2 - WALL, -WALL, BACK - WALL), (WIDTH / 2 + WALL, HEIGHT + WALL, FRONT + WALL)),
         ),
         background=(0.9, 1.25, 1.9),
@@ -209,4 +212,3 @@ def box(lights: int = 1, seed: int = 0) -> Scene:
         },
         name="box",
     )  # fmt: skip
-    return scene

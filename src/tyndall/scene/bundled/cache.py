@@ -1,9 +1,10 @@
 """Generated arrays kept on disk, so that a scene of millions of triangles is modelled once.
 
-An entry is a directory of ``.npy`` files and a manifest with their CRC-32; the arrays are memory-mapped when they are read.
-It lives at ``$TYNDALL_CACHE``, or else in the user's cache directory, under ``scenes/<name>/<version>/<key>``, where the
-version is a hash of the generator's own source: whoever changes the generator makes a new entry, and the old versions are
-removed. An entry that is incomplete or damaged is modelled again. A cache that cannot be written is no error.
+An entry is a directory of ``.npy`` files and a manifest with their CRC-32; the arrays are memory-mapped when they are
+read. It lives at ``$TYNDALL_CACHE``, or else in the user's cache directory, under ``scenes/<name>/<version>/<key>``,
+where the version is a hash of the generator's own source: whoever changes the generator makes a new entry, and the old
+versions are removed. An entry that is incomplete or damaged is modelled again. A cache that cannot be written is no
+error.
 """
 
 from __future__ import annotations

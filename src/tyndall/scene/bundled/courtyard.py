@@ -1,8 +1,8 @@
 """`courtyard`: an arcaded patio with a fountain under two trees; the sun falls through their foliage.
 
 The court is 12 m square, its fountain in the origin; a roofed arcade 3 m deep runs around it, 18.6 m square with its
-walls. 5,608,441 triangles, most of them leaves: the two crowns and the ivy are one mesh of 1,080,000 leaves with 138 MB of
-vertices, larger than one storage binding of many adapters; shrubs, columns, roofs and furniture are instanced.
+walls. 5,608,441 triangles, most of them leaves: the two crowns and the ivy are one mesh of 1,080,000 leaves with 138 MB
+of vertices, larger than one storage binding of many adapters; shrubs, columns, roofs and furniture are instanced.
 
 Modelling takes some seconds, so its arrays are kept on disk (:mod:`~tyndall.scene.bundled.cache`). Grass between the
 stones, one triangle a blade, makes up the exact count.
@@ -105,6 +105,10 @@ def _leaves(rng: Rng, roots: Floats, heading: Floats, up: Floats, length: Floats
     return Geometry(positions.reshape(-1, 3), normals.reshape(-1, 3), uvs.reshape(-1, 2), indices.reshape(-1, 3))
 
 
+def _vector(*components: float) -> NDArray[np.float32]:
+    return np.array(components, np.float32)
+
+
 def _normal(rng: Rng, count: int) -> Floats:
     return rng.standard_normal((count, 3), np.float32)
 
@@ -112,17 +116,17 @@ def _normal(rng: Rng, count: int) -> Floats:
 def _crown_leaves(rng: Rng, tips: Floats, count: int) -> Geometry:
     """Leaves in tufts about the twigs' tips, (M, 3), which leave gaps for the sun."""
     tufts = np.repeat(tips, 5, axis=0)
-    tufts = tufts + _normal(rng, len(tufts)) * np.float32((0.15, 0.09, 0.15))
+    tufts = tufts + _normal(rng, len(tufts)) * _vector(0.15, 0.09, 0.15)
     at = np.arange(count) % len(tufts)
     cloud = _normal(rng, count)
-    heading = cloud + 0.9 * _normal(rng, count) - np.float32((0, 0.6, 0))
-    up = 0.4 * cloud + 0.55 * _normal(rng, count) + np.float32((0, 1.0, 0))
-    spread = np.float32((0.075, 0.05, 0.075))
+    heading = cloud + 0.9 * _normal(rng, count) - _vector(0, 0.6, 0)
+    up = 0.4 * cloud + 0.55 * _normal(rng, count) + _vector(0, 1.0, 0)
+    spread = _vector(0.075, 0.05, 0.075)
     return _leaves(rng, tufts[at] + cloud * spread, heading, up, 0.048 + 0.03 * rng.random(count, np.float32), 16)
 
 
 def _ivy(rng: Rng, count: int) -> Geometry:
-    """Leaves that climb the outer walls, the arcade's corners and some of its front, denser near the ground and eaves."""
+    """Leaves that climb the outer walls and hang over the arcade's front, denser near the corners."""
     knots = 240
     around = rng.random(knots) * 8
     wall = around.astype(int) // 2
@@ -149,8 +153,8 @@ def _ivy(rng: Rng, count: int) -> Geometry:
     def spin(v: Floats) -> Floats:
         return np.stack([cos * v[:, 0] + sin * v[:, 2], v[:, 1], cos * v[:, 2] - sin * v[:, 0]], 1)
 
-    heading = 0.6 * _normal(rng, count) + np.float32((0, -0.8, 0.25))
-    up = 0.45 * _normal(rng, count) + np.float32((0, 0.45, 1.0))
+    heading = 0.6 * _normal(rng, count) + _vector(0, -0.8, 0.25)
+    up = 0.45 * _normal(rng, count) + _vector(0, 0.45, 1.0)
     return _leaves(rng, spin(local), spin(heading), spin(up), 0.04 + 0.035 * rng.random(count), 16)
 
 
@@ -161,7 +165,7 @@ def _shrub(rng: Rng, count: int) -> Geometry:
     lumps = 1 + 0.06 * np.sin(7 * out[:, 0] + 1) + 0.06 * np.sin(8 * out[:, 1] + 2) + 0.06 * np.sin(9 * out[:, 2])
     radius = 0.42 * lumps * (0.72 + 0.28 * rng.random(count) ** 0.5)
     heading = out + 0.7 * _normal(rng, count)
-    up = out + 0.5 * _normal(rng, count) + np.float32((0, 0.4, 0))
+    up = out + 0.5 * _normal(rng, count) + _vector(0, 0.4, 0)
     return _leaves(rng, out * radius[:, None], heading, up, 0.026 + 0.014 * rng.random(count), 16)
 
 
@@ -245,9 +249,7 @@ def _sprays(rng: Rng, count: int, reach: float, droop: float) -> Geometry:
         width = 0.3 * long
         points = np.stack([out + 0 * u, rise - 0.12 * width * np.abs(u), width * u + 0 * t], -1)
         part = sheet(points)
-        flipped = Geometry(
-            part.positions, part.normals, np.float32((0, 1)) + part.uvs * np.float32((1, -1)), part.indices
-        )
+        flipped = Geometry(part.positions, part.normals, _vector(0, 1) + part.uvs * _vector(1, -1), part.indices)
         card.append(flipped.retextured((0, 0), (1, -1)).retextured((0, 1)).at(0, 0, 0, k * GOLDEN_ANGLE))
     return merge(card)
 
@@ -316,7 +318,7 @@ def _arcade() -> Geometry:
 
 
 def _roof(rng: Rng) -> tuple[Geometry, Geometry]:
-    """Barrel tiles, and boards with rafters below them, of one side's lean-to roof (towards −Z), mitred at the corners."""
+    """Barrel tiles, and boards with rafters below, of one side's lean-to roof (towards −Z), mitred at the corners."""
     run, rise = RIDGE[0] - EAVE[0], RIDGE[1] - EAVE[1]
     slope, slant = math.atan2(rise, run), math.hypot(run, rise)
     pitch, course, long = 0.21, 0.36, 0.42
@@ -675,10 +677,10 @@ def _model(seed: int) -> _Model:
     fallen = 9000
     spot = np.stack([rng.normal(0, 3.2, fallen), np.full(fallen, 0.035), rng.normal(0, 3.2, fallen)], 1)
     spot[:, [0, 2]] = np.clip(spot[:, [0, 2]], -5.6, 5.6)
-    up = 0.35 * _normal(rng, fallen) + np.float32((0, 1, 0))
+    up = 0.35 * _normal(rng, fallen) + _vector(0, 1, 0)
     model.add(
         "fallen leaves",
-        _leaves(rng, spot, _normal(rng, fallen) * np.float32((1, 0.1, 1)), up, 0.045 + 0.03 * rng.random(fallen), 16),
+        _leaves(rng, spot, _normal(rng, fallen) * _vector(1, 0.1, 1), up, 0.045 + 0.03 * rng.random(fallen), 16),
     )
     missing = TRIANGLES - model.triangle_count
     model.add("grass", _grass(rng, missing))
@@ -760,13 +762,13 @@ def _materials(rng: Rng) -> dict[str, Material]:
         double_sided=True,
     )
     iron = Material("iron", base_color=(0.035, 0.045, 0.045, 1), roughness=0.45)
+    water = Material("water", base_color=(0.10, 0.22, 0.22, 1), roughness=0.08)
+    glass = Material("lantern glass", base_color=(0.9, 0.75, 0.5, 1), roughness=0.3, emissive=(0.8, 0.5, 0.22))
     return {
-        "ground": earth, "cobbles": cobble, "arcade floor": paving, "arcade": plaster, "column": stone, "roof tiles": tiles,
-        "timber": timber, "outer wall": ochre, "doors": door, "fountain": stone, "planter": stone, "trunks": bark,
-        "water": Material("water", base_color=(0.10, 0.22, 0.22, 1), roughness=0.08),
-        "foliage": foliage, "pot": terracotta, "small pot": terracotta, "shrub": shrub, "fern": fern, "bougainvillea": flower,
-        "table": iron, "chair": iron, "lantern": iron,
-        "lantern glass": Material("lantern glass", base_color=(0.9, 0.75, 0.5, 1), roughness=0.3, emissive=(0.8, 0.5, 0.22)),
+        "ground": earth, "cobbles": cobble, "arcade floor": paving, "arcade": plaster, "column": stone,
+        "roof tiles": tiles, "timber": timber, "outer wall": ochre, "doors": door, "fountain": stone, "planter": stone,
+        "water": water, "trunks": bark, "foliage": foliage, "pot": terracotta, "small pot": terracotta, "shrub": shrub,
+        "fern": fern, "bougainvillea": flower, "table": iron, "chair": iron, "lantern": iron, "lantern glass": glass,
         "fallen leaves": fallen, "grass": grass,
     }  # fmt: skip
 
@@ -794,7 +796,7 @@ def courtyard(lights: int = 1, seed: int = 0) -> Scene:
         instances=tuple(instances),
         lights=suns(options.lights, SUN, 4.0, (1.0, 0.92, 0.78), (38, 75)),
         camera=Camera((-4.5, 1.5, 5.3), (0.1, 1.95, -0.8), fov=math.radians(62), exposure=1.7),
-        medium=Medium(0.045, 0.002, HenyeyGreenstein(0.25), ((-10.0, -0.3, -10.0), (10.0, 8.5, 10.0))),
+        medium=Medium((0.045,) * 3, (0.002,) * 3, HenyeyGreenstein(0.25), ((-10.0, -0.3, -10.0), (10.0, 8.5, 10.0))),
         background=(0.55, 0.8, 1.25),
         ambient=(0.24, 0.27, 0.33),
         looks={

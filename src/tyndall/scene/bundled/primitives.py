@@ -1,9 +1,9 @@
 """Triangle geometry from formulas: the parts that the bundled scenes are assembled from.
 
 Every builder returns a :class:`Geometry` in metres with counter-clockwise outward winding. Solids are closed: where a
-crease or a texture seam needs two normals or two texture coordinates at one point, vertices are duplicated at bit-equal
-positions, so that welding by position gives back a surface without boundary. Shadow maps that draw back faces only depend
-on that. Texture coordinates are in metres unless a builder says otherwise.
+crease or a texture seam needs two normals or two texture coordinates at one point, vertices are duplicated at
+bit-equal positions, so that welding by position gives back a surface without boundary. Shadow maps that draw back
+faces only depend on that. Texture coordinates are in metres unless a builder says otherwise.
 
 Implicit surfaces are meshed by naive surface nets (Gibson 1998, "Constrained elastic surface nets"): one vertex in each
 cell that the surface crosses, one quadrilateral across each grid edge that it crosses.
@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -62,7 +63,8 @@ class Geometry:
 
     def retextured(self, offset: ArrayLike = (0, 0), scale: ArrayLike = (1, 1)) -> Geometry:
         """A copy with uv' = uv · scale + offset."""
-        return Geometry(self.positions, self.normals, (self.uvs * scale + offset).astype(np.float32), self.indices)
+        uvs = self.uvs * np.asarray(scale, np.float32) + np.asarray(offset, np.float32)
+        return Geometry(self.positions, self.normals, uvs, self.indices)
 
 
 def _unit(vectors: Floats) -> NDArray[np.float32]:
@@ -126,7 +128,7 @@ def merge(parts: Iterable[Geometry]) -> Geometry:
 
 
 def repeat(part: Geometry, matrices: Matrix, uv_offsets: Floats | None = None) -> Geometry:
-    """Copies of a geometry at (N, 4, 4) rotations with uniform scale, merged; ``uv_offsets`` (N, 2) vary their texture."""
+    """Copies of a geometry at (N, 4, 4) similarities, merged; ``uv_offsets`` (N, 2) vary their texture."""
     count, vertices = len(matrices), len(part.positions)
     linear = matrices[:, :3, :3].astype(np.float32)
     positions = part.positions @ linear.transpose(0, 2, 1)
@@ -149,8 +151,9 @@ def repeat(part: Geometry, matrices: Matrix, uv_offsets: Floats | None = None) -
 def refine(part: Geometry, triangles: int, project: Callable[[Floats], Floats] | None = None) -> Geometry:
     """The same surface with exactly ``triangles`` more triangles, by splitting the longest edges.
 
-    An edge between two triangles gives one triangle more to each, so ``triangles`` is even. Edges on a crease or seam stay
-    whole, which keeps a closed surface closed. ``project`` moves the new vertices, (N, 3) to (N, 3), onto a curved surface.
+    An edge between two triangles gives one triangle more to each, so ``triangles`` is even. Edges on a crease or seam
+    stay whole, which keeps a closed surface closed. ``project`` moves the new vertices, (N, 3) to (N, 3), onto a curved
+    surface.
 
     Raises:
         ValueError: ``triangles`` is odd or negative, or every edge is a crease or seam.
@@ -185,6 +188,8 @@ def _split_longest(part: Geometry, count: int, project: Callable[[Floats], Float
             chosen.append((int(left[i]), int(right[i])))
             if len(chosen) == count:
                 break
+    if not chosen:
+        return part
     positions, normals, uvs = list(part.positions), list(part.normals), list(part.uvs)
     faces_out = tri.copy()
     extra = []
@@ -243,7 +248,7 @@ def sheet(points: Floats, wrap: bool = False, uv_size: tuple[float, float] = (1.
 
 
 def plate(points: Floats, thickness: float, uv_size: tuple[float, float] = (1.0, 1.0)) -> Geometry:
-    """A closed shell of even ``thickness`` about a (rows, columns, 3) grid: bent plywood, a leather sole, a book cover."""
+    """A closed shell of even ``thickness`` about a (rows, columns, 3) grid: bent plywood, a roof tile, a blade."""
     points = np.asarray(points, np.float64)
     middle = sheet(points, uv_size=uv_size)
     offset = middle.normals.reshape(points.shape) * (thickness / 2)
@@ -259,7 +264,7 @@ def plate(points: Floats, thickness: float, uv_size: tuple[float, float] = (1.0,
 
 
 def flat(points: ArrayLike, normal: ArrayLike, uvs: ArrayLike | None = None) -> Geometry:
-    """A convex planar polygon (N, 3), counter-clockwise about ``normal``, as a fan; uv by projection along the normal."""
+    """A convex planar polygon (N, 3), counter-clockwise about ``normal``, as a fan; uv by projection along an axis."""
     position = np.asarray(points, np.float32)
     direction = np.asarray(normal, np.float64)
     if uvs is None:
@@ -320,6 +325,19 @@ def rounded_box(low: ArrayLike, high: ArrayLike, bevel: float, steps: int = 1) -
     return merge(faces)
 
 
+def _creases(line: Floats, angle: float) -> list[int]:
+    """Indices of a polyline's ends and of its corners sharper than ``angle``."""
+    step = np.diff(line, axis=0)
+    step = step / np.linalg.norm(step, axis=1, keepdims=True)
+    turn = np.einsum("ij,ij->i", step[:-1], step[1:])
+    return [0, *(np.flatnonzero(turn < math.cos(angle)) + 1).tolist(), len(line) - 1]
+
+
+def _travelled(line: Floats) -> Floats:
+    """Arc length at each point of a polyline."""
+    return np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+
+
 def lathe(profile: ArrayLike, segments: int, crease: float = math.radians(35)) -> Geometry:
     """A surface of revolution about +Y.
 
@@ -336,15 +354,11 @@ def lathe(profile: ArrayLike, segments: int, crease: float = math.radians(35)) -
     points[..., 0] = line[:, :1] * ring[:, 0]
     points[..., 1] = line[:, 1:]
     points[..., 2] = line[:, :1] * ring[:, 1]
-    step = np.diff(line, axis=0)
-    length = np.hypot(step[:, 0], step[:, 1])
-    turn = np.einsum("ij,ij->i", step[:-1], step[1:]) / (length[:-1] * length[1:])
-    cuts = [0, *(np.flatnonzero(turn < math.cos(crease)) + 1).tolist(), len(line) - 1]
-    height = np.concatenate([[0], np.cumsum(length)])
+    height = _travelled(line)
     around = 2 * math.pi * float(line[:, 0].max())
     return merge(
         sheet(points[a : b + 1], wrap=True, uv_size=(around, height[b] - height[a])).retextured((0, height[a]))
-        for a, b in zip(cuts[:-1], cuts[1:], strict=True)
+        for a, b in pairwise(_creases(line, crease))
     )
 
 
@@ -401,40 +415,43 @@ def smooth_path(points: ArrayLike, steps: int) -> Floats:
     return np.concatenate([*pieces, p[-2:-1]])
 
 
-def ribbon_solid(outline: Floats, depth: float) -> Geometry:
-    """A closed band with sharp edges: a (N, 2, 2) strip of lower and upper points in XY, extruded from z = 0 to ``depth``.
+def ribbon_solid(outline: Floats, depth: float, crease: float = math.radians(35)) -> Geometry:
+    """A closed band: a (N, 2, 2) strip of lower and upper points in XY, extruded in z from 0 to ``depth``.
 
-    The strip runs in +X with the lower point first; arches, lintels and cornices are such bands.
+    The upper points lie to the left of the strip's way; arches, lintels and book covers are such bands. Corners of its
+    two sides sharper than ``crease`` are edges.
     """
     strip = np.asarray(outline, np.float64)
     near = np.concatenate([strip, np.full((*strip.shape[:2], 1), depth)], -1)
     far = np.concatenate([strip, np.zeros((*strip.shape[:2], 1))], -1)
-    low_near, high_near, low_far, high_far = near[:, 0], near[:, 1], far[:, 0], far[:, 1]
 
-    def band(lower: Floats, upper: Floats) -> Geometry:
-        return sheet(np.stack([lower, upper]))
-
-    def planar(part: Geometry, normal: tuple[float, float, float]) -> Geometry:
+    def planar(rows: list[Floats], normal: tuple[float, float, float]) -> Geometry:
+        part = sheet(np.stack(rows))
         uvs = part.positions[:, :2]
-        return Geometry(part.positions, np.tile(np.float32(normal), (len(uvs), 1)), uvs.copy(), part.indices)
-
-    def swept(part: Geometry) -> Geometry:
-        travel = np.linalg.norm(np.diff(part.positions[: len(strip)], axis=0), axis=1)
-        u = np.tile(np.concatenate([[0], np.cumsum(travel)]), 2)
         return Geometry(
-            part.positions, part.normals, np.stack([u, part.positions[:, 2]], 1).astype(np.float32), part.indices
+            part.positions, np.tile(np.asarray(normal, np.float32), (len(uvs), 1)), uvs.copy(), part.indices
         )
 
-    ends = [
-        flat([low_far[0], low_near[0], high_near[0], high_far[0]], (-1, 0, 0)),
-        flat([low_near[-1], low_far[-1], high_far[-1], high_near[-1]], (1, 0, 0)),
-    ]
+    def swept(side: int, first: Floats, last: Floats) -> list[Geometry]:
+        along = _travelled(strip[:, side])
+        return [
+            sheet(np.stack([first[a : b + 1], last[a : b + 1]]), uv_size=(along[b] - along[a], depth)).retextured(
+                (along[a], 0)
+            )
+            for a, b in pairwise(_creases(strip[:, side], crease))
+        ]
+
+    ends = []
+    for k, outward in ((0, 1), (-1, -1)):
+        across = strip[k, 1] - strip[k, 0]
+        quad = [far[k, 0], near[k, 0], near[k, 1], far[k, 1]][::outward]
+        ends.append(flat(quad, (-across[1] * outward, across[0] * outward, 0)))
     return merge(
         [
-            planar(band(low_near, high_near), (0, 0, 1)),
-            planar(band(high_far, low_far), (0, 0, -1)),
-            swept(band(high_near, high_far)),
-            swept(band(low_far, low_near)),
+            planar([near[:, 0], near[:, 1]], (0, 0, 1)),
+            planar([far[:, 1], far[:, 0]], (0, 0, -1)),
+            *swept(1, near[:, 1], far[:, 1]),
+            *swept(0, far[:, 0], near[:, 0]),
             *ends,
         ]
     )
@@ -499,7 +516,7 @@ def slab_with_oculus(
     parts = [bore]
     for a, b, y in ((1, 2, -1.0), (3, 0, 1.0)):
         part = sheet(np.stack([rings[a], rings[b]]), wrap=True)
-        normals = np.tile(np.float32((0, y, 0)), (len(part.positions), 1))
+        normals = np.tile(np.array((0, y, 0), np.float32), (len(part.positions), 1))
         parts.append(Geometry(part.positions, normals, part.positions[:, [0, 2]].copy(), part.indices))
     outward = np.concatenate([outer, outer[:1]])
     for k in range(len(angle)):
@@ -520,14 +537,13 @@ Field = Callable[[Floats], Floats]
 def surface_nets(field: Field, low: ArrayLike, high: ArrayLike, cell: float) -> Geometry:
     """The zero set of ``field`` as a closed mesh with normals from the field's gradient.
 
-    The surface must lie strictly inside the box from ``low`` to ``high``; ``cell`` is the grid spacing in metres. Texture
-    coordinates are (angle about +Y · 1 m / 2π, height).
+    The surface must lie strictly inside the box from ``low`` to ``high``; ``cell`` is the grid spacing in metres.
+    Texture coordinates are (angle about +Y / 2π, height).
     """
     low, high = np.asarray(low, np.float64), np.asarray(high, np.float64)
     counts = np.ceil((high - low) / cell).astype(int) + 1
     grid = low + cell * np.stack(np.meshgrid(*(np.arange(n) for n in counts), indexing="ij"), -1)
     value = field(grid)
-    inside = value < 0
     total = np.zeros((*(counts - 1), 3))
     crossings = np.zeros(tuple(counts - 1), int)
     edges = []
@@ -589,7 +605,7 @@ def gradient(field: Field, points: Floats, step: float = 1e-4) -> Floats:
 
 
 def project_onto(field: Field, points: Floats, steps: int = 2) -> Floats:
-    """Points moved to the zero set by Newton steps along the gradient, each at most 2 cm so that none leaves its feature."""
+    """Points moved to the zero set by Newton steps along the gradient, 2 cm at most lest one leaves its feature."""
     for _ in range(steps):
         slope = gradient(field, points)
         move = (field(points) / np.maximum((slope**2).sum(-1), 1e-6))[..., None] * slope

@@ -33,10 +33,10 @@ def suns(
 ) -> tuple[DirectionalLight, ...]:
     """``count`` directional lights that together bring the illuminance of one.
 
-    Light 0 travels along ``direction``. Each further one comes from an azimuth one golden angle (137.5°) beyond the last,
-    which spreads any number of them evenly, and from an elevation that walks through the range ``elevations`` (degrees)
-    by the golden ratio; its hue drifts a little from ``color`` to cooler and warmer. Light 0 keeps twice the share of the
-    others: ``intensity`` · 2/(count + 1) and ``intensity`` / (count + 1), in lux.
+    Light 0 travels along ``direction``. Each further one comes from an azimuth one golden angle (137.5°) beyond the
+    last, which spreads any number of them evenly, and from an elevation that walks through the range ``elevations``
+    (degrees) in irrational steps; its hue drifts a little from ``color`` to cooler and warmer. Light 0 keeps twice the
+    share of the others: ``intensity`` · 2/(count + 1) and ``intensity`` / (count + 1), in lux.
     """
     azimuth = math.atan2(-direction[2], -direction[0])
     low, high = (math.radians(e) for e in elevations)

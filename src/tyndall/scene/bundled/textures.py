@@ -83,7 +83,7 @@ def wood(
 def paving(
     rng: Generator, name: str, low: Color, high: Color, joint: Color, *, across: int, metres: float, size: int = 512
 ) -> Texture:
-    """Square tiles, ``across`` to the texture, each with its own tint, with joints between; one texture covers ``metres``."""
+    """Square tiles with joints, ``across`` to the texture, each with its own tint; one texture covers ``metres``."""
     position = (np.arange(size) + 0.5) / size * across
     column = position.astype(int)
     tint = rng.random((across, across))[column[:, None], column[None, :]]
@@ -97,7 +97,7 @@ def paving(
 
 
 def swatches(rng: Generator, name: str, colors: list[Color], *, shades: int = 4, spread: float = 0.12) -> Texture:
-    """Strips of colour side by side along u, ``shades`` of each; a part picks one by its u and fades a little along v."""
+    """Strips of colour side by side along u, ``shades`` of each; a part picks one by its u and fades along v."""
     base = np.repeat(np.asarray(colors), shades, axis=0)
     base = base * (1 + spread * rng.uniform(-1, 1, (len(base), 1))) + 0.25 * spread * rng.uniform(-1, 1, base.shape)
     strip = np.repeat(base, 8, axis=0)
