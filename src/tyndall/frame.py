@@ -195,6 +195,7 @@ class Renderer:
         ).dispatch(*self.size)
 
         air = self._view("volumetric", scope, overlay)
+        air.images = {**images, "shadow_maps": visibility.maps}
         self.technique("volumetric").render(air)
 
         gpu.compute("composite", _MODULE, "composite").bind(scope, lit_out=images["lit"].write()).overlay(
@@ -252,7 +253,9 @@ class Renderer:
 
     def transmittance(self) -> NDArray[np.float32]:
         """(height, width, 3) float32 in 0..1: ``T``, what the air lets through."""
-        return np.ascontiguousarray(self.gpu.read_texture(self._images["transmittance_map"])[..., :3].astype(np.float32))
+        return np.ascontiguousarray(
+            self.gpu.read_texture(self._images["transmittance_map"])[..., :3].astype(np.float32)
+        )
 
     def depth(self) -> NDArray[np.float32]:
         """(height, width) float32: metres along the view axis, infinite for the background."""

@@ -177,9 +177,7 @@ class Gpu:
         self.adapter_info: dict[str, Any] = dict(native.info)
         features = [f for f in _FEATURES if f in native.features]
         limits = {name: native.limits[name] for name in _LIMITS if native.limits.get(name)}
-        self.device = native.request_device_sync(
-            label="tyndall", required_features=features, required_limits=limits
-        )
+        self.device = native.request_device_sync(label="tyndall", required_features=features, required_limits=limits)
         self.features = frozenset(features)
         self.limits: Mapping[str, int] = {**native.limits, **limits}
         self.ledger = Ledger()
@@ -692,9 +690,7 @@ def _bindings_module(names: Sequence[str], slots: Sequence[Slot]) -> str:
     return "\n".join([*imports, *structs, *lines, ""])
 
 
-def _raster_descriptor(
-    label: str, layout: Any, module: Any, entries: tuple[str, ...], state: Raster
-) -> dict[str, Any]:
+def _raster_descriptor(label: str, layout: Any, module: Any, entries: tuple[str, ...], state: Raster) -> dict[str, Any]:
     descriptor: dict[str, Any] = {
         "label": label,
         "layout": layout,

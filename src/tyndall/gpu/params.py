@@ -284,7 +284,8 @@ def struct_wesl(cls: type, name: str) -> str:
         members.append(f"    {f.name}: {wgsl[0]},")
         if get_origin(f.type) is Literal:
             constants += [
-                f"const {cls.__name__.upper()}_{f.name.upper()}_{choice.upper()} = {i}u;" for i, choice in enumerate(get_args(f.type))
+                f"const {cls.__name__.upper()}_{f.name.upper()}_{choice.upper()} = {i}u;"
+                for i, choice in enumerate(get_args(f.type))
             ]
     if not members:
         members = ["    unused_: u32,"]

@@ -144,7 +144,9 @@ class Buffer(Resource):
             return self.element.rpartition("::")[2], f"import {self.element};"
         return self.element, ""
 
-    def _bound(self, declaration: str, kind: str, visibility: int, *, offset: int = 0, size: int | None = None) -> Bound:
+    def _bound(
+        self, declaration: str, kind: str, visibility: int, *, offset: int = 0, size: int | None = None
+    ) -> Bound:
         name, preamble = self._named()
         slot = Slot(declaration.replace("ELEMENT", name), (("buffer", (("type", kind),)),), visibility, preamble)
         size = self.size_bytes - offset if size is None else size

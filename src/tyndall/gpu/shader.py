@@ -29,9 +29,11 @@ _USED = re.compile(r"@group\(0\)\s*@binding\((\d+)\)")
 _VIRTUAL_IMPORT = re.compile(r"import\s+(package::(?:bindings|visibility))::(\{[^}]*\}|\w+)\s*;")
 _ATTRIBUTE = re.compile(r"@\w+(?:\([^)]*\))?\s*")
 _DECLARATION = re.compile(r"(?:fn|struct|const|override|var(?:<[^>]*>)?)\s+(\w+)")
-# A line number of the driver's report: in its heading "┌─ label:6:1", or beside the quoted line whose part it underlines.
-_DRIVER_HEADING = re.compile(r"┌─ .*:(\d+):\d+$", re.MULTILINE)
+# Line numbers of the driver's report. A fault of grammar has its place in the heading, "┌─ wgsl:4:5"; a fault of meaning
+# names the function there, and underlines what it found, of which the last is the statement that failed.
+_DRIVER_GRAMMAR = re.compile(r"┌─ wgsl:(\d+):\d+$", re.MULTILINE)
 _DRIVER_MARKED = re.compile(r"^\s*(\d+) │.*\n\s*│[ │]*\^", re.MULTILINE)
+_DRIVER_FUNCTION = re.compile(r"┌─ .*:(\d+):\d+$", re.MULTILINE)
 
 
 class ShaderError(RuntimeError):
@@ -86,7 +88,12 @@ class Linker:
         raise ShaderError(f"{self.filenames.get(module, module)}:1:1: no compute entry point '{entry}'")
 
     def link(
-        self, module: str, entries: tuple[str, ...], bindings: str, overlay: Mapping[str, str], features: Mapping[str, bool]
+        self,
+        module: str,
+        entries: tuple[str, ...],
+        bindings: str,
+        overlay: Mapping[str, str],
+        features: Mapping[str, bool],
     ) -> Linked:
         """Link the entry points of ``module``.
 
@@ -165,8 +172,9 @@ def create_module(
         return device.create_shader_module(label=label, code=linked.wgsl)
     except (wgpu.GPUError, RuntimeError) as error:
         text = str(error)
-        position = _DRIVER_MARKED.search(text) or _DRIVER_HEADING.search(text)
-        where = linker.locate(linked, int(position.group(1))) if position else f"{label}:1:1"
+        found = (p.findall(text) for p in (_DRIVER_GRAMMAR, _DRIVER_MARKED, _DRIVER_FUNCTION))
+        line = next((lines[-1] for lines in found if lines), None)
+        where = linker.locate(linked, int(line)) if line else f"{label}:1:1"
         detail = [line.strip() for line in text.splitlines() if line.strip()]
         raise ShaderError(f"{where}: " + "\n".join(detail)) from None
 

@@ -135,10 +135,14 @@ class View:
 class Visibility:
     """What a shadow technique provides to the frame.
 
+    Shadow maps come with every technique: what is exact only on surfaces leaves the air to them.
+
     Attributes:
         module: a WESL module with ``fn visibility(light: u32, position: vec3f, normal: vec3f) -> f32``.
         bindings: what that module imports from ``package::bindings``.
+        maps: the shadow maps, a depth layer per map (reversed-Z; 0 where nothing was drawn).
     """
 
     module: str
     bindings: Mapping[str, Any]
+    maps: Texture

@@ -37,7 +37,9 @@ class ShadowMap(Technique):
 
     name: ClassVar[str] = "shadow_map"
     paper: ClassVar[str] = "Williams 1978, Casting curved shadows on curved surfaces"
-    advice: ClassVar[str] = "The default: hard shadows for any scene and light; edges show texels when the map is too small."
+    advice: ClassVar[str] = (
+        "The default: hard shadows for any scene and light; edges show texels when the map is too small."
+    )
 
     size: int = param(1024, 16, 16384, "width and height of a map", unit="texel", rebuild=True)
     bias: float = param(0.5, 0, 64, "constant bias towards the light", unit="texel")

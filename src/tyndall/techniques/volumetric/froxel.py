@@ -27,8 +27,12 @@ class Froxel(Technique):
     """A 3-D grid over the view frustum."""
 
     name: ClassVar[str] = "froxel"
-    paper: ClassVar[str] = "Wronski 2015, Volumetric fog and lighting; Hillaire 2015, Physically based volumetric rendering"
-    advice: ClassVar[str] = "The usual choice in games: cheap, any light, nearly independent of the scene; fine shafts blur."
+    paper: ClassVar[str] = (
+        "Wronski 2015, Volumetric fog and lighting; Hillaire 2015, Physically based volumetric rendering"
+    )
+    advice: ClassVar[str] = (
+        "The usual choice in games: cheap, any light, nearly independent of the scene; fine shafts blur."
+    )
 
     grid: tuple[int, int, int] = param((190, 90, 128), 1, 1024, "froxels across, down and deep", rebuild=True)
     model: Literal["physical", "paper"] = param("physical", doc="the scene's medium, or S1's equations")
@@ -45,5 +49,7 @@ class Froxel(Technique):
         accumulated = view.texture("accumulated", self.grid, "rgba16float", dimension="3d")
         linear = view.gpu.sampler()
         view.compute("scatter").bind(scattering_out=scattering.write()).dispatch(*self.grid)
-        view.compute("accumulate").bind(scattering=scattering, accumulated_out=accumulated.write()).dispatch(*self.grid[:2])
+        view.compute("accumulate").bind(scattering=scattering, accumulated_out=accumulated.write()).dispatch(
+            *self.grid[:2]
+        )
         view.compute("apply").bind(accumulated=accumulated, linear_sampler=linear).dispatch(*view.size)

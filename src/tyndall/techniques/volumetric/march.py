@@ -1,9 +1,9 @@
 """Brute-force ray march of single scattering against the shadow technique's visibility.
 
-``L_v = Σ_steps Σ_lights σs · p(θ) · E · V · ∫ e^(−σt·s) ds``: the light that reaches each step's sample is taken as constant
-over the step, the extinction is integrated exactly, so an unshadowed uniform medium is exact with any number of steps under
-a directional light. Steps have equal transmittance (equal length in thin air). Converged, this is the reference that the
-other techniques are held against.
+``L_v = Σ_lights Σ_steps σs · p(θ) · E · V · ∫ e^(−σt·s) ds``. For a directional light the light that reaches a step's sample is
+taken as constant over the step and the extinction is integrated exactly, so an unshadowed uniform medium is exact with any
+number of steps; steps have equal transmittance (equal length in thin air). For a point or spot light the steps are even in
+the angle at the light (Kulla and Fajardo 2012). Converged, this is the reference that the other techniques are held against.
 
 The number of loop iterations of one dispatch is kept below 2^16: software adapters silently cut longer loops, so many
 lights are marched in several dispatches.
@@ -28,7 +28,7 @@ class March(Technique):
     paper: ClassVar[str] = "Tóth and Umenhoffer 2009, Real-time volumetric lighting in participating media"
     advice: ClassVar[str] = "The truth to compare with, or for stills: cost grows with pixels × steps × lights."
 
-    steps: int = param(128, 1, 30_000, "samples along a ray")
+    steps: int = param(128, 1, 30_000, "samples along a ray for each light")
     jitter: float = param(1.0, 0, 1, "random shift of the samples, changing every frame", unit="step")
 
     def render(self, view: View) -> None:

@@ -1,36 +1,37 @@
 """The lit volume as a mesh (Billeter 2010; Hoobler 2016).
 
-A mesh with one vertex at each texel of a light's shadow map parts the lit air from the shaded. Along a view ray the light
-scattered up to a distance is known in closed form, ``F(t) = σs·p·E·(1 − e^(−σt·t))/σt``, so each face that the ray crosses
-adds or subtracts one term: no samples, no steps, all detail of the map. Vertices are pulled from the map itself; the mesh
+A mesh with one vertex at each texel of a light's shadow map parts the lit air from the shaded. The light that the air
+scatters up to a distance along a view ray is known when nothing shades it, so each face that the ray crosses adds or
+subtracts one such term: no samples, no steps, all detail of the map. Vertices are pulled from the map itself; the mesh
 takes no memory.
 
-``model="physical"`` sums over the shaded air instead of the lit: ``L_v = Σ_lights lit·G(0) ∓ Σ_faces G(t)``, where
-``G(t) = F(t_end) − F(t)`` is what lies between a face and the surface behind it, minus where the ray enters the shadow and
-plus where it leaves it. Faces behind the surface have ``G = 0``, so the depth test drops them before they are shaded; the
-light's near plane needs no cap, as the air around the map is lit; and the first term knows whether the ray begins in shadow.
+``model="physical"`` sums over the shaded air instead of the lit: ``L_v = Σ_lights lit·G(0) ∓ Σ_faces G(t)``, where ``G(t)``
+is the airlight between a face and the surface behind it, minus where the ray enters the shadow and plus where it leaves it.
+Faces behind the surface have ``G = 0``, so the depth test drops them before they are shaded; the light's near plane needs no
+cap, as the air around the map is lit; and the first term knows whether the ray begins in shadow. For directional lights
+``G`` is a closed form; for point lights (six maps) and spot lights it is a quadrature in every fragment, several times as
+dear.
 
 ``model="paper"`` is S1's equation 9: ``L_c·ρ(g)·(1 − e^(−τd))/τ``, without σs, for every face of the mesh, far plane included,
 without depth test, added where the ray leaves the lit volume and subtracted where it enters it, ``d`` clamped at the surface
-behind the pixel; the sides of the map and its near plane stay open, and the base image is not attenuated.
-
-Closed forms exist for parallel light in a homogeneous medium: other lights are refused.
+behind the pixel; the sides of the map and its near plane stay open, and the base image is not attenuated. The equation is
+one of parallel light: other lights are refused.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 
 from tyndall.gpu.device import ADD, GpuError, Raster
 from tyndall.gpu.params import param
 from tyndall.scene.model import DirectionalLight, Scene
 from tyndall.techniques.contract import Technique, Unsupported, View
+from tyndall.techniques.shadow.shadow_map import layer_count
 
 _STATE = Raster(targets=(("rgba32float", ADD),), topology="triangle-strip")
-_TESTED = Raster(
-    targets=(("rgba32float", ADD),), topology="triangle-strip", depth="depth32float", depth_write=False
-)
+# The mesh lies on the lit surfaces, where G = 0: pushed back a little, those faces fail the depth test.
+_TESTED = replace(_STATE, depth="depth32float", depth_write=False, depth_bias=-64)
 
 
 @dataclass(frozen=True)
@@ -39,19 +40,21 @@ class Polygonal(Technique):
 
     name: ClassVar[str] = "polygonal"
     paper: ClassVar[str] = "Billeter 2010, Real time volumetric shadows using polygonal light volumes; Hoobler 2016"
-    advice: ClassVar[str] = "Sharp, noise-free shafts of directional lights in a uniform medium; cost grows with map² × lights."
+    advice: ClassVar[str] = (
+        "Sharp, noise-free shafts in a uniform medium, best for the sun; cost grows with map² × lights."
+    )
 
     model: Literal["physical", "paper"] = param("physical", doc="the scene's medium, or S1's equation")
     g: float = param(0.4, -0.99, 0.99, "mean cosine of the phase function (paper)")
     tau: float = param(0.3, 1e-9, None, "extinction coefficient (paper)", unit="1/m")
 
     def supports(self, scene: Scene) -> None:
-        """Raise :class:`Unsupported` if a light is not directional."""
+        """Raise :class:`Unsupported` if the paper's equation cannot describe a light."""
         for index, light in enumerate(scene.lights):
-            if not isinstance(light, DirectionalLight):
+            if self.model == "paper" and not isinstance(light, DirectionalLight):
                 raise Unsupported(
-                    f"polygonal integrates directional lights only, and lights[{index}] is a {light.kind} light:"
-                    " use froxel or march"
+                    f"polygonal's paper model knows directional lights only, and lights[{index}] is a {light.kind} light:"
+                    " use model physical"
                 )
 
     def render(self, view: View) -> None:
@@ -62,15 +65,20 @@ class Polygonal(Technique):
         if not view.scene.lights:
             return
         gpu, physical = view.gpu, self.model == "physical"
-        size: int = view.scope["shadow_maps"].size[0]
+        size = view.images["shadow_maps"].size[0]
         target = [(view.images["inscatter"].view(), None)]
         depth = (view.images["depth"].view(), None) if physical else None
+        bindings = {**view.scope, "params": view.params}
+        layer = 0
         with gpu.render(f"{view.owner}.faces", target, depth, depth_read_only=True) as native:
-            for index in range(len(view.scene.lights)):
-                bindings = {**view.scope, "params": view.params, "light_index": gpu.constant(index)}
-                pipeline, group = gpu.raster(
-                    self.shader(), _TESTED if physical else _STATE, bindings, overlay=view.overlay
-                )
-                native.set_pipeline(pipeline)
-                native.set_bind_group(0, group)
-                native.draw(2 * size, size - 1)  # a strip a row of texels
+            for index, light in enumerate(view.scene.lights):
+                bindings["light_index"] = gpu.constant(index)
+                for _ in range(layer_count(light)):
+                    bindings["layer"] = gpu.constant(layer)
+                    pipeline, group = gpu.raster(
+                        self.shader(), _TESTED if physical else _STATE, bindings, overlay=view.overlay
+                    )
+                    native.set_pipeline(pipeline)
+                    native.set_bind_group(0, group)
+                    native.draw(2 * size, size - 1)  # a strip a row of texels
+                    layer += 1

@@ -30,7 +30,9 @@ class ScreenSpace(Technique):
 
     name: ClassVar[str] = "screen_space"
     paper: ClassVar[str] = "Mitchell 2007, Volumetric light scattering as a post-process"
-    advice: ClassVar[str] = "Cheap shafts when the light is in the picture against an open sky; right only up to a scale."
+    advice: ClassVar[str] = (
+        "Cheap shafts when the light is in the picture against an open sky; right only up to a scale."
+    )
 
     samples: int = param(64, 1, 4096, "samples from a pixel towards the light")
     model: Literal["physical", "paper"] = param("physical", doc="the scene's medium, or S1's equation")

@@ -1,0 +1,199 @@
+"""The device: limits, ledger, bytes, names and times of passes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import props
+import pytest
+
+from tyndall.frame import Renderer
+from tyndall.gpu.device import Gpu, GpuError, choose_adapter
+from tyndall.gpu.resources import BYTES_PER_TEXEL, texel_dtype
+from tyndall.scene.model import DirectionalLight, Medium, PointLight, Scene
+from tyndall.techniques import FAMILIES
+from tyndall.techniques.shadow.shadow_map import ShadowMap
+
+LIT_WALL = Scene([props.wall(-4)], [DirectionalLight((0, 0, -1), 1.0)], props.AHEAD, Medium(0.1))
+
+
+def test_an_unknown_adapter_is_refused_with_those_there_are(gpu: Gpu) -> None:
+    with pytest.raises(GpuError) as error:
+        choose_adapter("voodoo 2")
+    assert "no adapter matches 'voodoo 2'" in str(error.value)
+    assert repr(gpu.adapter_info["device"]) in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_an_adapter_is_found_by_a_part_of_its_name_or_backend(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
+    name = gpu.adapter_info["device"]
+    assert choose_adapter(name[:6].upper()).info["device"] == name
+    assert choose_adapter(gpu.adapter_info["backend_type"].lower()).info["backend_type"] == "Vulkan"
+    monkeypatch.setenv("TYNDALL_ADAPTER", "voodoo 2")
+    with pytest.raises(GpuError, match="voodoo 2"):
+        choose_adapter()
+    assert choose_adapter(name).info["device"] == name, "what is asked for goes before the environment"
+
+
+@pytest.mark.parametrize(
+    ("size", "dimension", "message"),
+    [
+        ((10**6, 4), "2d", r"big: 1000000×4×1 texels; this adapter's limit is \d+"),
+        ((4, 4, 10**5), "2d-array", r"big: 4×4×100000 texels; this adapter's limit is \d+ layers"),
+        ((4, 4, 10**5), "3d", r"big: 4×4×100000 texels; this adapter's limit is \d+"),
+        ((0, 4), "2d", "big: 0×4×1 texels"),
+    ],
+)
+def test_textures_beyond_the_limits(gpu: Gpu, size: tuple[int, ...], dimension: str, message: str) -> None:
+    total = gpu.ledger.total
+    with pytest.raises(GpuError, match=message) as error:
+        gpu.texture("big", size, "r32float", owner="test", dimension=dimension)
+    assert "\n" not in str(error.value)
+    assert gpu.ledger.total == total
+
+
+def test_buffers_beyond_the_limits(gpu: Gpu) -> None:
+    with pytest.raises(GpuError, match=r"big: 1000000000000000 bytes; a buffer of this adapter holds \d+"):
+        gpu.buffer("big", 10**15, owner="test")
+
+
+@pytest.mark.parametrize("size", [(0, 4), (10**6, 10)])
+def test_pictures_that_cannot_be(gpu: Gpu, size: tuple[int, int]) -> None:
+    before = gpu.ledger.total
+    with pytest.raises(GpuError, match=str(max(size))) as error:
+        Renderer(LIT_WALL, size, gpu=gpu)
+    assert "\n" not in str(error.value)
+    assert gpu.ledger.total == before, "a refused renderer leaves nothing behind"
+
+
+@pytest.mark.parametrize("format", BYTES_PER_TEXEL)
+def test_bytes_of_a_texture_are_those_of_its_texels(gpu: Gpu, format: str) -> None:
+    scalar, channels = texel_dtype(format)
+    texel = np.dtype(scalar).itemsize * channels
+    for size, dimension, texels in (((5, 3), "2d", 15), ((5, 3, 4), "2d-array", 60)):
+        usage = "sampled target" if format.startswith("depth") else "sampled"
+        texture = gpu.texture("test", size, format, owner="test", dimension=dimension, usage=usage)
+        assert texture.size_bytes == texels * texel
+        assert ("test", "test", texels * texel) in list(gpu.ledger)
+        texture.destroy()
+        texture.destroy()
+        assert "test" not in gpu.ledger.by_owner()
+
+
+def test_bytes_of_mips_and_volumes(gpu: Gpu) -> None:
+    pyramid = gpu.texture("test", (8, 4), "rgba8unorm", owner="test", usage="sampled", mips=4)
+    assert pyramid.size_bytes == 4 * (8 * 4 + 4 * 2 + 2 * 1 + 1 * 1)
+    volume = gpu.texture("test", (8, 4, 2), "rgba16float", owner="test", dimension="3d", mips=2)
+    assert volume.size_bytes == 8 * (8 * 4 * 2 + 4 * 2 * 1)
+    assert gpu.ledger.by_owner()["test"] == pyramid.size_bytes + volume.size_bytes
+    pyramid.destroy()
+    volume.destroy()
+
+
+def test_bytes_of_buffers(gpu: Gpu) -> None:
+    for data, size in ((np.zeros(100, np.float32), 400), (np.zeros(3, np.uint8), 16), (1000, 1000)):
+        buffer = gpu.buffer("test", data, owner="test")
+        assert buffer.size_bytes == size
+        buffer.destroy()
+
+
+def test_what_is_written_is_read(gpu: Gpu) -> None:
+    rng = np.random.default_rng(1)
+    image = rng.random((7, 13, 4), np.float32)
+    texture = gpu.texture("test", (13, 7), "rgba32float", owner="test", data=image)
+    assert np.array_equal(gpu.read_texture(texture), image)
+    volume = rng.integers(0, 2**32, (5, 7, 13, 1), np.uint32)
+    voxels = gpu.texture("test", (13, 7, 5), "r32uint", owner="test", dimension="3d", data=volume)
+    assert np.array_equal(gpu.read_texture(voxels), volume)
+    words = rng.integers(0, 2**32, 1001, np.uint32)
+    buffer = gpu.buffer("test", words, owner="test")
+    gpu.write(buffer, words[:2], 8)
+    assert np.array_equal(gpu.read_buffer(buffer), np.concatenate([words[:2], words[:2], words[4:]]))
+    for resource in (texture, voxels, buffer):
+        resource.destroy()
+
+
+def test_passes_are_named_and_timed_in_order(gpu: Gpu) -> None:
+    with Renderer(
+        LIT_WALL, (64, 48), gpu=gpu, volumetric="march", antialiasing="taa", tonemap="aces", shadow=ShadowMap(size=64)
+    ) as renderer:
+        for _ in range(2):
+            renderer.draw()
+        timed = gpu.timings()
+        summed = renderer.timings()
+    if not timed:
+        pytest.skip("this adapter has no timestamp queries")
+    names = [name for name, _ in timed]
+    assert names == [
+        "gbuffer.mesh",
+        "shadow.shadow_map",
+        "lighting",
+        "volumetric.march.march",
+        "composite",
+        "antialiasing.taa.resolve",
+        "tonemap.aces.aces",
+        "frame",
+    ]
+    times = dict(timed)
+    assert summed == times
+    assert all(t >= 0 for t in times.values())
+    assert times["frame"] > 0
+    whole = times.pop("frame")
+    assert max(times.values()) <= whole * 1.001
+    assert sum(times.values()) <= whole * 1.5 + 0.05, "passes do not overlap much"
+    assert times["volumetric.march.march"] == max(times.values()), "128 steps a pixel are the most work here"
+
+
+def test_passes_of_one_name_are_added_up(gpu: Gpu) -> None:
+    lights = [PointLight((0, 0, 0), 1.0)]
+    with Renderer(LIT_WALL.with_(lights=lights), props.TINY, gpu=gpu, shadow=ShadowMap(size=64)) as renderer:
+        renderer.draw()
+        timed = gpu.timings()
+        if not timed:
+            pytest.skip("this adapter has no timestamp queries")
+        parts = [t for name, t in timed if name == "shadow.shadow_map"]
+        assert len(parts) == 6
+        assert renderer.timings()["shadow.shadow_map"] == pytest.approx(sum(parts))
+
+
+def test_a_native_object_carries_its_pass_name(gpu: Gpu) -> None:
+    with Renderer(LIT_WALL, props.TINY, gpu=gpu, volumetric="froxel", shadow=ShadowMap(size=64)) as renderer:
+        labels = {label for _, label, _ in gpu.ledger}
+        renderer.draw()
+        labels = {label for _, label, _ in gpu.ledger}
+    assert {"frame.depth", "volumetric.froxel.scattering", "shadow.shadow_map.maps", "mesh.positions"} <= labels
+
+
+@pytest.mark.parametrize("name", FAMILIES["volumetric"].members)
+def test_nothing_is_left_when_a_device_closes(name: str) -> None:
+    gpu = Gpu()
+    with gpu, Renderer(LIT_WALL, props.TINY, gpu=gpu, volumetric=name, shadow=ShadowMap(size=64)) as renderer:
+        renderer.draw()
+        assert gpu.ledger.total > 0
+    assert list(gpu.ledger) == []
+    assert gpu.ledger.total == 0
+
+
+def test_a_renderer_closes_the_device_that_it_made() -> None:
+    with Renderer(LIT_WALL, props.TINY, shadow=ShadowMap(size=64)) as renderer:
+        renderer.draw()
+        renderer.use("volumetric", "off")
+        renderer.draw()
+        ledger = renderer.gpu.ledger
+        assert ledger.total > 0
+    assert list(ledger) == []
+
+
+def test_a_failed_pass_does_not_poison_the_next(gpu: Gpu) -> None:
+    """A renderer that broke in the middle of a frame drops what it had recorded."""
+    renderer = Renderer(LIT_WALL, props.TINY, gpu=gpu, shadow=ShadowMap(size=64))
+
+    def broken(*_: Any) -> Any:
+        raise RuntimeError("broken")
+
+    with renderer, pytest.MonkeyPatch.context() as patch:
+        patch.setattr(FAMILIES["volumetric"].members["froxel"], "render", broken)
+        with pytest.raises(RuntimeError, match="broken"):
+            renderer.draw()
+    assert props.shoot(gpu, LIT_WALL).base.max() > 0.1
