@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import os
 import signal
@@ -18,6 +19,7 @@ from PIL import Image
 import tyndall
 from tyndall.app.cli import main
 from tyndall.gpu.params import fields_of
+from tyndall.lab import bench
 from tyndall.techniques import FAMILIES
 
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
@@ -182,6 +184,20 @@ def test_lights_are_placed_in_a_bundled_scene(capsys: pytest.CaptureFixture[str]
     ]
     one, three = (pixels_of(folder / image) for image in images)
     assert not np.array_equal(one, three)
+
+
+def test_bench_writes_its_figures_as_json_and_as_tables(
+    capsys: pytest.CaptureFixture[str], folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tiny = dataclasses.replace(
+        bench.QUICK, size=(16, 9), shadow_size=64, grid=(8, 4, 4), lights=(1, 2), error_scenes=(), frames=1, warmup=0
+    )
+    monkeypatch.setattr(bench, "QUICK", tiny)
+    code, out, err = run(capsys, "bench", "volumetric", "--quick", "--out", "figures")
+    assert code == 0, err
+    assert "| box (4,968) | froxel |" in out
+    kept = json.loads((folder / "figures/volumetric.json").read_text())
+    assert {row["technique"] for row in kept["scenes"]} >= {"off", "froxel", "march"}
 
 
 # --- mistakes -----------------------------------------------------------------------------------------------------

@@ -289,14 +289,15 @@ def _explain(error: Exception) -> tuple[str, int]:
         if option is not None and hasattr(error, "possibilities"):
             return f"no such option {option}{nearest(option, known or ())}", MISTAKE
         return error.format_message(), MISTAKE
-    # What the project raises on purpose is written for the user.
-    if type(error).__module__.startswith("tyndall."):
+    # What the project raises on purpose is written for the user; but its shaders are its own.
+    kind = type(error)
+    if kind.__module__.startswith("tyndall.") and kind.__name__ != "ShaderError":
         return str(error), MISTAKE
-    if isinstance(error, MemoryError) or type(error).__name__ == "GPUOutOfMemoryError":
+    if isinstance(error, MemoryError) or kind.__name__ == "GPUOutOfMemoryError":
         return "not enough memory for what was asked", MISTAKE
     if isinstance(error, OSError) and error.strerror:
         return f"{error.filename or 'system'}: {error.strerror}", MISTAKE
-    return f"this is a fault in Tyndall: {type(error).__name__}: {error} (--debug shows where)", FAULT
+    return f"this is a fault in Tyndall: {kind.__name__}: {error} (--debug shows where)", FAULT
 
 
 def _others(**chosen: str | None) -> dict[str, str]:
