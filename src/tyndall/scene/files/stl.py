@@ -1,7 +1,7 @@
 """STL, ASCII and binary (3D Systems, "StereoLithography interface specification", 1989).
 
-An STL is a list of separate triangles, so a facet is flat: its normal is that of its plane (the file's own normals
-are often wrong and are not read). Corners are welded where both position and normal are the same bits, which saves memory
+An STL is a list of separate triangles, so a facet is flat: its normal is that of its plane (the file's own normals are
+often wrong and are not read). Corners are welded where both position and normal are the same bits, which saves memory
 on the flat faces of a machine part; above a million triangles, a scan, there is little to weld, and it is not tried.
 """
 
