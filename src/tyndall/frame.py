@@ -68,8 +68,8 @@ class Renderer:
         size: width and height in pixels.
         gpu: the device to draw on; the renderer makes its own, and closes it, when none is given.
         adapter: part of an adapter's name, for a device of its own.
-        volumetric, shadow, antialiasing, tonemap: techniques, by name or as instances; by name they start from the scene's
-            ``looks``.
+        volumetric, shadow, antialiasing, tonemap: techniques, by name or as instances; by name they start from the
+            scene's ``looks``.
         seed: of everything random.
 
     Raises:

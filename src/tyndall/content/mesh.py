@@ -1,9 +1,9 @@
 """Triangle meshes on the device.
 
-All meshes share one position stream (12 bytes a vertex; all that a solid mesh needs in a shadow map), one attribute stream
-(normal as snorm16, texture coordinate as float32; 16 bytes) and one index buffer; the three are vertex and index buffers,
-so a storage binding's limit does not bound them. Instances of a mesh are one draw. What is drawn is recorded once into
-render bundles and replayed, so a frame's host cost does not grow with the number of meshes.
+All meshes share one position stream (12 bytes a vertex; all that a solid mesh needs in a shadow map), one attribute
+stream (normal as snorm16, texture coordinate as float32; 16 bytes) and one index buffer; the three are vertex and
+index buffers, so a storage binding's limit does not bound them. Instances of a mesh are one draw. What is drawn is
+recorded once into render bundles and replayed, so a frame's host cost does not grow with the number of meshes.
 """
 
 from __future__ import annotations

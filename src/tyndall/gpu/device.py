@@ -6,9 +6,9 @@ A pass is one expression whose name is its label, its timer and its line in ever
         .bind(camera=camera, params=params, scattering=grid.write())
         .dispatch(190, 90, 128)
 
-``bind`` names what the shader may import from ``package::bindings``; the layout holds what it does import. Pipelines, bind
-groups and layouts are cached, so that the same expression costs little in the next frame. Passes are recorded into one
-encoder until :meth:`Gpu.submit`.
+``bind`` names what the shader may import from ``package::bindings``; the layout holds what it does import. Pipelines,
+bind groups and layouts are cached, so that the same expression costs little in the next frame. Passes are recorded
+into one encoder until :meth:`Gpu.submit`.
 """
 
 from __future__ import annotations
@@ -92,7 +92,9 @@ def adapters() -> list[wgpu.GPUAdapter]:
 
 
 def choose_adapter(name: str | None = None) -> wgpu.GPUAdapter:
-    """The adapter whose device name or backend contains ``name`` (any case), or else ``$TYNDALL_ADAPTER``, or the best.
+    """The adapter whose device name or backend contains ``name`` (any case), or else the best.
+
+    ``$TYNDALL_ADAPTER`` stands in for a ``name`` that is not given.
 
     Raises:
         GpuError: none at all, or none of that name.
@@ -100,7 +102,8 @@ def choose_adapter(name: str | None = None) -> wgpu.GPUAdapter:
     found = adapters()
     if not found:
         raise GpuError(
-            "no graphics adapter answers; on Debian or Ubuntu, 'apt-get install mesa-vulkan-drivers' gives a software one"
+            "no graphics adapter answers; on Debian or Ubuntu, 'apt-get install mesa-vulkan-drivers' gives a "
+            "software one"
         )
     name = name or os.environ.get("TYNDALL_ADAPTER") or None
     if name is None:
@@ -473,7 +476,7 @@ class Gpu:
         return program.pipeline, self._group(program, bound)
 
     def bundle(self, label: str, state: Raster) -> Any:
-        """A render bundle encoder for passes with the formats of ``state``: recorded once, replayed at no host cost."""
+        """A render bundle encoder for passes with the formats of ``state``: recorded once, replayed at no cost."""
         return self.device.create_render_bundle_encoder(
             label=label,
             color_formats=[format for format, _ in state.targets],
@@ -508,8 +511,8 @@ class Gpu:
         self._readback.unmap()
         stamps = raw.reshape(-1, 2) * self._period * 1e-6
         if self.adapter_info["adapter_type"] == "CPU":
-            # Mesa's software adapter runs passes one after another, but may stamp a pass's beginning only when its work is
-            # done; the end of the pass before is when it really began.
+            # Mesa's software adapter runs passes one after another, but may stamp a pass's beginning only when its
+            # work is done; the end of the pass before is when it really began.
             stamps[1:, 0] = stamps[:-1, 1]
         times = [(label, float(max(0.0, end - begin))) for label, (begin, end) in zip(labels, stamps, strict=True)]
         return [*times, ("frame", float(stamps[:, 1].max() - stamps[:, 0].min()))]

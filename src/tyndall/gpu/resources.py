@@ -1,7 +1,7 @@
 """Buffers and textures, each counted in the ledger, and how a shader sees them.
 
-A *slot* is what a shader sees of a resource: its WESL declaration and its layout entry, derived from the resource and the
-way it is bound (sampled, written, as uniform …). A *bound* resource is a slot with the native object behind it.
+A *slot* is what a shader sees of a resource: its WESL declaration and its layout entry, derived from the resource and
+the way it is bound (sampled, written, as uniform …). A *bound* resource is a slot with the native object behind it.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ def texel_dtype(format: str) -> tuple[Any, int]:
 
 @dataclass(frozen=True)
 class Slot:
-    """How a shader sees a resource. ``declaration`` has ``{name}``; ``preamble`` holds the struct or import it needs."""
+    """How a shader sees a resource: a declaration of ``{name}``, and the struct or import that it needs before it."""
 
     declaration: str
     layout: tuple[tuple[str, Any], ...]
@@ -71,7 +71,9 @@ _serial = itertools.count()
 
 
 class Bound:
-    """A slot with its native resource. ``key`` is unique while the resource lives, so bind groups can be cached by it."""
+    """A slot with its native resource. ``key`` is unique while the resource lives, so bind groups can be cached by
+    it.
+    """
 
     __slots__ = ("key", "native", "slot")
 
@@ -171,7 +173,8 @@ class Buffer(Resource):
 
     @property
     def _cache(self) -> dict[str, Bound]:
-        return self.__dict__.setdefault("_bounds", {})
+        cache: dict[str, Bound] = self.__dict__.setdefault("_bounds", {})
+        return cache
 
     def _cached(self, key: str, declaration: str, kind: str, visibility: int) -> Bound:
         if key not in self._cache:
@@ -198,7 +201,8 @@ class Texture(Resource):
 
     @property
     def _cache(self) -> dict[Any, Any]:
-        return self.__dict__.setdefault("_bounds", {})
+        cache: dict[Any, Any] = self.__dict__.setdefault("_bounds", {})
+        return cache
 
     def view(self, *, layer: int | None = None) -> Any:
         """A native view: of everything, or of one layer as 2-D."""
@@ -222,7 +226,8 @@ class Texture(Resource):
                 kind = "unfilterable-float"
             layout = (("texture", (("sample_type", kind), ("view_dimension", self.dimension))),)
             self._cache["sampled"] = Bound(Slot(f"var {{name}}: {wesl};", layout, _ALL), self.view())
-        return self._cache["sampled"]
+        sampled: Bound = self._cache["sampled"]
+        return sampled
 
     def write(self) -> Bound:
         """As a write-only storage texture, in compute only."""
@@ -239,7 +244,8 @@ class Texture(Resource):
             )
             declaration = f"var {{name}}: texture_storage_{self.dimension.replace('-', '_')}<{self.format}, {wesl}>;"
             self._cache[wesl] = Bound(Slot(declaration, layout, _COMPUTE), self.view())
-        return self._cache[wesl]
+        stored: Bound = self._cache[wesl]
+        return stored
 
 
 class Sampler:

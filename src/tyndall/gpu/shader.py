@@ -29,8 +29,8 @@ _USED = re.compile(r"@group\(0\)\s*@binding\((\d+)\)")
 _VIRTUAL_IMPORT = re.compile(r"import\s+(package::(?:bindings|visibility))::(\{[^}]*\}|\w+)\s*;")
 _ATTRIBUTE = re.compile(r"@\w+(?:\([^)]*\))?\s*")
 _DECLARATION = re.compile(r"(?:fn|struct|const|override|var(?:<[^>]*>)?)\s+(\w+)")
-# Line numbers of the driver's report. A fault of grammar has its place in the heading, "┌─ wgsl:4:5"; a fault of meaning
-# names the function there, and underlines what it found, of which the last is the statement that failed.
+# Line numbers of the driver's report. A fault of grammar has its place in the heading, "┌─ wgsl:4:5"; a fault of
+# meaning names the function there, and underlines what it found, of which the last is the statement that failed.
 _DRIVER_GRAMMAR = re.compile(r"┌─ wgsl:(\d+):\d+$", re.MULTILINE)
 _DRIVER_MARKED = re.compile(r"^\s*(\d+) │.*\n\s*│[ │]*\^", re.MULTILINE)
 _DRIVER_FUNCTION = re.compile(r"┌─ .*:(\d+):\d+$", re.MULTILINE)
@@ -121,8 +121,8 @@ class Linker:
     def locate(self, linked: Linked, line: int) -> str:
         """``file:line:column`` of a line of linked WGSL: the source line that it was printed from.
 
-        The linker keeps declarations whole and prefixes the names of imported ones with their module, so the declaration
-        around the line names the module, and the source line there that shares the most words is the one.
+        The linker keeps declarations whole and prefixes the names of imported ones with their module, so the
+        declaration around the line names the module, and the source line there that shares the most words is the one.
         """
         lines = linked.wgsl.splitlines()
         if not 0 < line <= len(lines):
@@ -158,8 +158,8 @@ def create_module(
 ) -> wgpu.GPUShaderModule:
     """A shader module for the driver.
 
-    ``trusted`` code keeps bounds checks but drops the iteration limit that wgpu-native adds to every loop, which costs up
-    to 2.5× (measured on an H200). Code that a user wrote must not be trusted.
+    ``trusted`` code keeps bounds checks but drops the iteration limit that wgpu-native adds to every loop, which
+    costs up to 2.5× (measured on an H200). Code that a user wrote must not be trusted.
 
     Raises:
         ShaderError: the driver's validator refused it; positions are those of the WESL source.
@@ -180,7 +180,7 @@ def create_module(
 
 
 def _create_trusted(device: wgpu.GPUDevice, code: str, label: str) -> wgpu.GPUShaderModule | None:
-    """wgpuDeviceCreateShaderModuleTrusted of wgpu-native, which wgpu-py 0.32 does not wrap; None where it is missing."""
+    """wgpuDeviceCreateShaderModuleTrusted of wgpu-native, which wgpu-py 0.32 does not wrap; None if missing."""
     try:
         from wgpu.backends.wgpu_native import _api as api
 

@@ -1,8 +1,8 @@
 """What techniques have in common, and what each of them sees of a frame.
 
-A technique is a frozen dataclass of declared parameters with a name, a source and one method, ``render(view)``. Its shader
-is the ``.wesl`` file of the same name beside it. A :class:`View` gives it the frame's resources by name, textures of its
-own that live as long as the technique is in use, and passes whose names begin with the technique's.
+A technique is a frozen dataclass of declared parameters with a name, a source and one method, ``render(view)``. Its
+shader is the ``.wesl`` file of the same name beside it. A :class:`View` gives it the frame's resources by name,
+textures of its own that live as long as the technique is in use, and passes whose names begin with the technique's.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from tyndall.gpu.resources import Bound, Buffer, ParamsBuffer, Resource, Texture
 from tyndall.scene.model import Scene
 
 
-class Unsupported(ValueError):
+class Unsupported(ValueError):  # noqa: N818 - a refusal, not a fault
     """A technique cannot draw this scene; the message says why and what to use instead."""
 
 
@@ -68,7 +68,8 @@ class View:
     scope: dict[str, Any] = field(default_factory=dict)
     overlay: dict[str, str] = field(default_factory=dict)
     frame: int = 0
-    _resources: dict[Any, Resource] = field(default_factory=dict)
+    _resources: dict[str, Resource] = field(default_factory=dict)
+    _descriptions: dict[str, Any] = field(default_factory=dict)
     _params: ParamsBuffer | None = None
 
     @property
@@ -111,10 +112,6 @@ class View:
         made: Resource = make(f"{self.owner}.{label}")
         self._resources[label] = made
         return made
-
-    @property
-    def _descriptions(self) -> dict[str, Any]:
-        return self.__dict__.setdefault("_described", {})
 
     def compute(self, entry: str, *, module: str | None = None) -> ComputePass:
         """A compute pass named ``family.technique.entry`` that runs this entry point of the technique's shader."""

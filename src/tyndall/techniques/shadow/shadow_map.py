@@ -1,14 +1,14 @@
 """Shadow maps (Williams 1978).
 
 The scene's depth is drawn from each light; a point is in shadow where something nearer was drawn:
-``V(p) = 1 if z(p) ≥ depth(p) else 0`` in reversed-Z. Directional lights use an orthographic map fitted to the scene's box,
-spot lights a perspective one, point lights a cube of six. All maps are layers of one depth texture.
+``V(p) = 1 if z(p) ≥ depth(p) else 0`` in reversed-Z. Directional lights use an orthographic map fitted to the scene's
+box, spot lights a perspective one, point lights a cube of six. All maps are layers of one depth texture.
 
-A surface's own texel would shade it in places ("acne"). Three remedies, each in texels of the map so that they hold at
-any resolution and scale: a constant bias and one that grows with the slope, both towards the light, and an offset along
-the normal (Holbert 2011). Drawing only back faces (``cull="front"``) is the fourth; it lets light leak under thin casters.
-Points in the air get no bias. With ``filtering="linear"`` the four nearest texels' answers are weighted (Reeves 1987 with
-the smallest kernel).
+A surface's own texel would shade it in places ("acne"). Three remedies, each in texels of the map so that they hold
+at any resolution and scale: a constant bias and one that grows with the slope, both towards the light, and an offset
+along the normal (Holbert 2011). Drawing only back faces (``cull="front"``) is the fourth; it lets light leak under
+thin casters. Points in the air get no bias. With ``filtering="linear"`` the four nearest texels' answers are weighted
+(Reeves 1987 with the smallest kernel).
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Tone mapping, then sRGB encoding (IEC 61966-2-1) with a half-byte dither that hides banding.
 
-``aces`` is the fitted reference and output transform of Hill 2016 (RRT+ODT), ``agx`` Sobotka's AgX in the polynomial form
-of Wrensch 2023, ``none`` clips. The camera's exposure is applied before.
+``aces`` is the fitted reference and output transform of Hill 2016 (RRT+ODT), ``agx`` Sobotka's AgX in the polynomial
+form of Wrensch 2023, ``none`` clips. The camera's exposure is applied before.
 """
 
 from __future__ import annotations

@@ -1,16 +1,18 @@
 """Frustum-aligned voxels (Wronski 2015).
 
-The view frustum is cut into ``W×H×D`` cells. Pass *scatter* finds, per froxel, the light scattered towards the viewer per
-metre; pass *accumulate* integrates each column front to back; pass *apply* samples the sums at each pixel's depth.
+The view frustum is cut into ``W×H×D`` cells. Pass *scatter* finds, per froxel, the light scattered towards the viewer
+per metre; pass *accumulate* integrates each column front to back; pass *apply* samples the sums at each pixel's
+depth.
 
-``model="physical"`` takes the scene's medium: a slab of a froxel adds ``T·J·(1 − e^(−σt·Δs))/σt`` (Hillaire 2015) and the
-base image is attenuated by ``T``. Slices lie between the nearest and the farthest point of the medium (or of the scene, or
-``z_limit``), clipped to the medium's box; what lies beyond the last slice counts as lit, as it does outside a shadow map.
+``model="physical"`` takes the scene's medium: a slab of a froxel adds ``T·J·(1 − e^(−σt·Δs))/σt`` (Hillaire 2015) and
+the base image is attenuated by ``T``. Slices lie between the nearest and the farthest point of the medium (or of the
+scene, or ``z_limit``), clipped to the medium's box; what lies beyond the last slice counts as lit, as it does outside
+a shadow map.
 
-``model="paper"`` is S1's equations 10–12: ``L = L_c·V·ρ(g)·C_s·density·D(k)``, summed without extinction and added to an
-unattenuated base image; slices are uniform in clip-space depth between the near plane and ``z_limit`` (S1's projection is
-standard-Z), light intensity is not dimmed by the medium, and a pixel takes the value of its froxel's layer. Where ``z_limit``
-is 0 it is the far side of the scene.
+``model="paper"`` is S1's equations 10–12: ``L = L_c·V·ρ(g)·C_s·density·D(k)``, summed without extinction and added to
+an unattenuated base image; slices are uniform in clip-space depth between the near plane and ``z_limit`` (S1's
+projection is standard-Z), light intensity is not dimmed by the medium, and a pixel takes the value of its froxel's
+layer. Where ``z_limit`` is 0 it is the far side of the scene.
 """
 
 from __future__ import annotations

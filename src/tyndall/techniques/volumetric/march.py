@@ -1,9 +1,10 @@
 """Brute-force ray march of single scattering against the shadow technique's visibility.
 
-``L_v = Σ_lights Σ_steps σs · p(θ) · E · V · ∫ e^(−σt·s) ds``. For a directional light the light that reaches a step's sample is
-taken as constant over the step and the extinction is integrated exactly, so an unshadowed uniform medium is exact with any
-number of steps; steps have equal transmittance (equal length in thin air). For a point or spot light the steps are even in
-the angle at the light (Kulla and Fajardo 2012). Converged, this is the reference that the other techniques are held against.
+``L_v = Σ_lights Σ_steps σs · p(θ) · E · V · ∫ e^(−σt·s) ds``. For a directional light the light that reaches a step's
+sample is taken as constant over the step and the extinction is integrated exactly, so an unshadowed uniform medium is
+exact with any number of steps; steps have equal transmittance (equal length in thin air). For a point or spot light
+the steps are even in the angle at the light (Kulla and Fajardo 2012). Converged, this is the reference that the other
+techniques are held against.
 
 The number of loop iterations of one dispatch is kept below 2^16: software adapters silently cut longer loops, so many
 lights are marched in several dispatches.

@@ -2,20 +2,20 @@
 
 A mesh with one vertex at each texel of a light's shadow map parts the lit air from the shaded. The light that the air
 scatters up to a distance along a view ray is known when nothing shades it, so each face that the ray crosses adds or
-subtracts one such term: no samples, no steps, all detail of the map. Vertices are pulled from the map itself; the mesh
-takes no memory.
+subtracts one such term: no samples, no steps, all detail of the map. Vertices are pulled from the map itself; the
+mesh takes no memory.
 
-``model="physical"`` sums over the shaded air instead of the lit: ``L_v = Σ_lights lit·G(0) ∓ Σ_faces G(t)``, where ``G(t)``
-is the airlight between a face and the surface behind it, minus where the ray enters the shadow and plus where it leaves it.
-Faces behind the surface have ``G = 0``, so the depth test drops them before they are shaded; the light's near plane needs no
-cap, as the air around the map is lit; and the first term knows whether the ray begins in shadow. For directional lights
-``G`` is a closed form; for point lights (six maps) and spot lights it is a quadrature in every fragment, several times as
-dear.
+``model="physical"`` sums over the shaded air instead of the lit: ``L_v = Σ_lights lit·G(0) ∓ Σ_faces G(t)``, where
+``G(t)`` is the airlight between a face and the surface behind it, minus where the ray enters the shadow and plus
+where it leaves it. Faces behind the surface have ``G = 0``, so the depth test drops them before they are shaded; the
+light's near plane needs no cap, as the air around the map is lit; and the first term knows whether the ray begins in
+shadow. For directional lights ``G`` is a closed form; for point lights (six maps) and spot lights it is a quadrature
+in every fragment, several times as dear.
 
-``model="paper"`` is S1's equation 9: ``L_c·ρ(g)·(1 − e^(−τd))/τ``, without σs, for every face of the mesh, far plane included,
-without depth test, added where the ray leaves the lit volume and subtracted where it enters it, ``d`` clamped at the surface
-behind the pixel; the sides of the map and its near plane stay open, and the base image is not attenuated. The equation is
-one of parallel light: other lights are refused.
+``model="paper"`` is S1's equation 9: ``L_c·ρ(g)·(1 − e^(−τd))/τ``, without σs, for every face of the mesh, far plane
+included, without depth test, added where the ray leaves the lit volume and subtracted where it enters it, ``d``
+clamped at the surface behind the pixel; the sides of the map and its near plane stay open, and the base image is not
+attenuated. The equation is one of parallel light: other lights are refused.
 """
 
 from __future__ import annotations
@@ -53,8 +53,8 @@ class Polygonal(Technique):
         for index, light in enumerate(scene.lights):
             if self.model == "paper" and not isinstance(light, DirectionalLight):
                 raise Unsupported(
-                    f"polygonal's paper model knows directional lights only, and lights[{index}] is a {light.kind} light:"
-                    " use model physical"
+                    f"polygonal's paper model knows directional lights only, and lights[{index}] is a {light.kind} "
+                    "light: use model physical"
                 )
 
     def render(self, view: View) -> None:

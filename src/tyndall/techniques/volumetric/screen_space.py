@@ -1,16 +1,18 @@
 """Light shafts as a blur of the sky towards the light (Mitchell 2007).
 
-One pass over the picture: from each pixel, N samples towards the light's place on the screen ask whether the sky is seen
-there; what they see stands for the light that reaches the air in front of the pixel. Occluders outside the picture, in front
-of the light but not in front of the sky, or off the line to the light are missed.
+One pass over the picture: from each pixel, N samples towards the light's place on the screen ask whether the sky is
+seen there; what they see stands for the light that reaches the air in front of the pixel. Occluders outside the
+picture, in front of the light but not in front of the sky, or off the line to the light are missed.
 
-``model="paper"`` is S1's equations 6–8: ``L_v = exposure · Σ_i decay^i · weight · L_c·V(p_i)/N``, ``p_i = p + i·(p_l − p)/N``
-for i = 1 … N, ``V = 1`` where the depth is the sky's and ``p_i`` lies in the picture. It is added to an unattenuated base image.
+``model="paper"`` is S1's equations 6–8: ``L_v = exposure · Σ_i decay^i · weight · L_c·V(p_i)/N`` with
+``p_i = p + i·(p_l − p)/N`` for i = 1 … N and ``V = 1`` where the depth is the sky's and ``p_i`` lies in the picture. It is
+added to an unattenuated base image.
 
-``model="physical"`` scatters in the scene's medium: the mean visibility ``V̄ = Σ decay^i·V / Σ decay^i`` multiplies the airlight
-of the unshadowed ray, ``σs·p·E·(1 − e^(−σt·d))/σt`` for a directional light, and its quadrature for a point or spot light;
-the base image is attenuated. A sample outside the picture says nothing and is left out of the mean; where all are, V̄ = 0. For
-point and spot lights a sample sees the light if what it shows lies farther than the light.
+``model="physical"`` scatters in the scene's medium: the mean visibility ``V̄ = Σ decay^i·V / Σ decay^i`` multiplies
+the airlight of the unshadowed ray, ``σs·p·E·(1 − e^(−σt·d))/σt`` for a directional light, and its quadrature for a
+point or spot light; the base image is attenuated. A sample outside the picture says nothing and is left out of the
+mean; where all are, V̄ = 0. For point and spot lights a sample sees the light if what it shows lies farther than the
+light.
 
 A light behind the camera has no place on the screen: it makes no shafts (S1's formula would mirror it).
 """
