@@ -56,7 +56,7 @@ def fox(p: NDArray[np.floating[Any]]) -> Floats:
     body = smooth_union(body, limb(mirrored, (0.2, 0.05, 0.0), (0.2, 0.05, 0.19), 0.062, 0.058), 0.05)
     body = smooth_union(body, limb(mirrored, (0.09, 0.5, 0.12), (0.085, 0.07, 0.2), 0.075, 0.054), 0.06)
     body = smooth_union(body, ellipsoid(mirrored, (0.085, 0.045, 0.24), (0.062, 0.055, 0.08)), 0.04)
-    body = smooth_union(body, ellipsoid(p, (0.05, 0, 0), (0.36, 0.06, 0.38)), 0.04)
+    body = smooth_union(body, ellipsoid(p, (0.05, 0.03, 0), (0.38, 0.05, 0.4)), 0.04)
     head = ellipsoid(p, (0, 0.945, 0.12), (0.15, 0.128, 0.145))
     head = smooth_union(head, ellipsoid(mirrored, (0.1, 0.9, 0.13), (0.088, 0.07, 0.095)), 0.06)
     head = smooth_union(head, limb(p, (0, 0.905, 0.2), (0, 0.877, 0.385), 0.084, 0.042), 0.05)
@@ -190,7 +190,7 @@ def box(lights: int = 1, seed: int = 0) -> Scene:
         "cube": (cube, oak),
         "jar": (jar, glaze),
     }
-    figure = surface_nets(fox, (-0.45, -0.05, -0.6), (0.65, 1.3, 0.5), 0.049)
+    figure = surface_nets(fox, (-0.46, -0.09, -0.6), (0.65, 1.3, 0.5), 0.049)
     missing = TRIANGLES - figure.triangle_count - sum(part.triangle_count for part, _ in rest.values())
     figure = refine(figure, missing, lambda points: project_onto(fox, points))
     rest["fox"] = (figure.at(0, PLINTH - 0.004, -0.15, -0.3), clay)

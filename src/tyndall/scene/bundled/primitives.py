@@ -176,7 +176,8 @@ def _split_longest(part: Geometry, count: int, project: Callable[[Floats], Float
     start, end = tri.ravel(), np.roll(tri, -1, axis=1).ravel()
     order = np.argsort(np.minimum(start, end) * vertices + np.maximum(start, end), kind="stable")
     key = (np.minimum(start, end) * vertices + np.maximum(start, end))[order]
-    pair = np.flatnonzero(key[:-1] == key[1:])
+    first, uses = np.unique(key, return_index=True, return_counts=True)[1:]
+    pair = first[uses == 2]
     left, right = order[pair], order[pair + 1]
     length = np.linalg.norm(part.positions[start[left]] - part.positions[end[left]], axis=1)
     used: set[int] = set()
