@@ -5,8 +5,8 @@ seen there; what they see stands for the light that reaches the air in front of 
 picture, in front of the light but not in front of the sky, or off the line to the light are missed.
 
 ``model="paper"`` is S1's equations 6–8: ``L_v = exposure · Σ_i decay^i · weight · L_c·V(p_i)/N`` with
-``p_i = p + i·(p_l − p)/N`` for i = 1 … N and ``V = 1`` where the depth is the sky's and ``p_i`` lies in the picture. It is
-added to an unattenuated base image.
+``p_i = p + i·(p_l − p)/N`` for i = 1 … N and ``V = 1`` where the depth is the sky's and ``p_i`` lies in the picture. It
+is added to an unattenuated base image.
 
 ``model="physical"`` scatters in the scene's medium: the mean visibility ``V̄ = Σ decay^i·V / Σ decay^i`` multiplies
 the airlight of the unshadowed ray, ``σs·p·E·(1 − e^(−σt·d))/σt`` for a directional light, and its quadrature for a
