@@ -213,7 +213,7 @@ def arriving(light: Light, sigma: ArrayLike, points: Floats) -> tuple[Floats, Fl
 def reflected(
     material: Material, normal: ArrayLike, to_viewer: ArrayLike, to_light: ArrayLike, albedo: ArrayLike | None = None
 ) -> Floats:
-    """glTF 2.0's metallic-roughness BRDF times cos θ_l (appendix B), for unit vectors (…, 3)."""
+    """Metallic-roughness BRDF times cos θ_l for unit vectors (…, 3): glTF's gloss over Shirley 1997's matte base."""
     n, v, l = (np.asarray(x, float) for x in (normal, to_viewer, to_light))
     color = np.array(material.base_color[:3]) if albedo is None else np.asarray(albedo)
     h = v + l
@@ -228,7 +228,9 @@ def reflected(
     g = 0.5 / (n_l * np.sqrt(n_v**2 * (1 - a2) + a2) + n_v * np.sqrt(n_l**2 * (1 - a2) + a2))
     f0 = 0.04 + (color - 0.04) * material.metallic
     f = f0 + (1 - f0) * (1 - l_h) ** 5
-    return np.where(n_l > 0, ((1 - f) * color * (1 - material.metallic) / np.pi + f * d * g) * n_l, 0.0)
+    gloss = 1 - material.roughness
+    through = 0.96 / (1 - gloss / 21) * (1 - gloss * (1 - n_l) ** 5) * (1 - gloss * (1 - n_v) ** 5)
+    return np.where(n_l > 0, (through * color * (1 - material.metallic) / np.pi + f * d * g) * n_l, 0.0)
 
 
 def surface_light(scene: Scene, size: tuple[int, int], normal: Vec3, distance: ArrayLike) -> Floats:
