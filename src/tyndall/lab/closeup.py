@@ -120,8 +120,9 @@ def strip(reference: Pixels, technique: Pixels, error: NDArray[np.float32], name
             ratio = _PANEL / error.shape[1]
             for number, place in enumerate(places, 1):
                 x, y = left + place.x * ratio, top + place.y * ratio
-                corner = (x + place.width * ratio - 1, y + place.height * ratio - 1)
-                draw.rectangle((x, y, *corner), outline=_FRAME)
+                far_x, far_y = x + place.width * ratio - 1, y + place.height * ratio - 1
+                draw.rectangle((x - 1, y - 1, far_x + 1, far_y + 1), outline=_PAPER, width=3)  # seen on white
+                draw.rectangle((x, y, far_x, far_y), outline=_FRAME)
                 draw.text((x + 4, y + 2), str(number), _FRAME, font, stroke_width=2, stroke_fill=_PAPER)
         top += height + _GAP
     return np.asarray(canvas)
