@@ -1,9 +1,10 @@
-"""The same view by three techniques: time, memory, and error against a converged ray march."""
+"""The same view by four techniques: time, memory, and error against a converged ray march."""
 
 import tyndall as ty
 
 scene = ty.scenes.box(lights=1)
-result = ty.compare(scene, size=(160, 90), volumetric=["off", "screen_space", "froxel"], frames=3, warmup=1)
+techniques = ["off", "screen_space", "polygonal", ty.Froxel(grid=(80, 45, 32))]
+result = ty.compare(scene, size=(96, 54), volumetric=techniques, frames=3, warmup=1)
 print(result)
 result.save("comparison")
 best = min(result.results, key=lambda r: r.error.rel_rmse)
