@@ -6,7 +6,7 @@ depth.
 
 ``model="physical"`` takes the scene's medium: a slab of a froxel adds ``T·J·(1 − e^(−σt·Δs))/σt`` (Hillaire 2015) and
 the base image is attenuated by ``T``. Slices lie between the nearest and the farthest point of the medium (or of the
-scene, or ``z_limit``), clipped to the medium's box; what lies beyond the last slice counts as lit, as it does outside
+scene, or ``far``), clipped to the medium's box; what lies beyond the last slice counts as lit, as it does outside
 a shadow map.
 
 ``model="paper"`` is S1's equations 10–12: ``L = L_c·V·ρ(g)·C_s·density·D(k)``, summed without extinction and added to
@@ -38,9 +38,14 @@ class Froxel(Technique):
 
     grid: tuple[int, int, int] = param((190, 90, 128), 1, 1024, "froxels across, down and deep", rebuild=True)
     model: Literal["physical", "paper"] = param("physical", doc="the scene's medium, or S1's equations")
-    z_limit: float = param(0.0, 0, None, "view depth where the grid ends; 0: the far side of the medium", unit="m")
+    far: float = param(
+        0.0, 0, None, "view depth where the grid ends; 0: the far side of the medium (physical)", unit="m"
+    )
     samples: int = param(1, 1, 16, "light samples along a froxel (physical)")
     jitter: float = param(0.0, 0, 1, "random shift of the samples, changing every frame (physical)", unit="froxel")
+    z_limit: float = param(
+        0.0, 0, None, "view depth where the grid ends; 0: the far side of the scene (paper)", unit="m"
+    )
     g: float = param(0.4, -0.99, 0.99, "mean cosine of the phase function (paper)")
     density: float = param(1.0, 0, None, "density of the medium (paper)")
     c_s: float = param(0.1, 0, None, "scattering constant (paper)", unit="1/m")
