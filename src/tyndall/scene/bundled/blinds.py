@@ -621,7 +621,7 @@ def blinds(lights: int = 1, seed: int = 0) -> Scene:
 
     return Scene(
         instances=tuple(instances),
-        lights=suns(options.lights, SUN, 50.0, (1.0, 0.88, 0.70), (18, 55)),
+        lights=suns(options.lights, SUN, 50.0, (1.0, 0.88, 0.70), (18, 50), spread=90.0),
         camera=Camera((2.75, 1.32, 6.9), (1.0, 1.3, 3.4), fov=math.radians(60), exposure=-0.6),
         medium=Medium(
             (0.09,) * 3,
@@ -629,8 +629,8 @@ def blinds(lights: int = 1, seed: int = 0) -> Scene:
             HenyeyGreenstein(0.5),
             ((-WALL, -WALL, -WALL), (WIDTH + WALL, HEIGHT + WALL, LENGTH + WALL)),
         ),
-        background=(7.0, 8.0, 9.5),
-        ambient=(1.1, 1.13, 1.2),
+        background=(4.6, 5.3, 6.3),
+        ambient=(0.75, 0.77, 0.82),
         looks={
             "screen_space": {"exposure": 1.0, "decay": 0.9, "weight": 0.002},
             "polygonal": {"g": 0.5, "tau": 1.99e-5},

@@ -28,6 +28,7 @@ from tyndall.scene.bundled.primitives import (
     refine,
     rotation,
     rounded_box,
+    scaling,
     slab_with_oculus,
     smooth_union,
     surface_nets,
@@ -46,7 +47,7 @@ SUN = (0.47, -0.83, 0.25)
 
 
 def fox(p: NDArray[np.floating[Any]]) -> Floats:
-    """Signed value of a sitting fox, 1.2 m tall, that looks along +Z; an approximate distance in metres."""
+    """Signed value of a sitting fox, 1.2 units tall, that looks along +Z; an approximate distance."""
     x = np.abs(p[..., 0])
     mirrored = np.stack([x, p[..., 1], p[..., 2]], -1)
     body = limb(p, (0, 0.27, -0.17), (0, 0.64, 0.04), 0.225, 0.165)
@@ -193,18 +194,18 @@ def box(lights: int = 1, seed: int = 0) -> Scene:
     figure = surface_nets(fox, (-0.46, -0.09, -0.6), (0.65, 1.3, 0.5), 0.049)
     missing = TRIANGLES - figure.triangle_count - sum(part.triangle_count for part, _ in rest.values())
     figure = refine(figure, missing, lambda points: project_onto(fox, points))
-    rest["fox"] = (figure.at(0, PLINTH - 0.004, -0.15, -0.3), clay)
+    rest["fox"] = (figure.placed(scaling(1.25, 1.25, 1.25)).at(-0.06, PLINTH - 0.004, -0.15, -0.3), clay)
 
     return Scene(
         instances=tuple(Instance(part.mesh(material, name), name=name) for name, (part, material) in rest.items()),
         lights=suns(options.lights, SUN, 10.0, (1.0, 0.93, 0.82), (46, 72)),
-        camera=Camera((0.75, 1.3, 3.1), (-0.1, 1.45, -0.6), fov=math.radians(57), exposure=1.6),
+        camera=Camera((0.7, 1.35, 2.75), (-0.08, 1.52, -0.6), fov=math.radians(57), exposure=1.6),
         medium=Medium(
             (0.16,) * 3, (0.01,) * 3, HenyeyGreenstein(0.4),
             ((-WIDTH / 2 - WALL, -WALL, BACK - WALL), (WIDTH / 2 + WALL, HEIGHT + WALL, FRONT + WALL)),
         ),
         background=(0.9, 1.25, 1.9),
-        ambient=(0.15, 0.16, 0.18),
+        ambient=(0.2, 0.2, 0.21),
         looks={
             "screen_space": {"exposure": 1.0, "decay": 0.94, "weight": 0.01},
             "polygonal": {"g": 0.4, "tau": 0.3},

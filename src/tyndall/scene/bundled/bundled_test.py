@@ -96,7 +96,7 @@ def test_solids_are_closed_and_wound_outwards(scene: Scene) -> None:
 
 
 def test_normals_agree_with_the_winding(scene: Scene) -> None:
-    # A few corners may face away: the fox's creases that are narrower than a cell of its net, tight bends of thin tubes.
+    # A few corners may face away: creases of the fox that are narrower than a cell of its net, tight bends of tubes.
     for mesh in _meshes(scene):
         assert mesh.normals is not None
         some = mesh.indices[:: max(1, mesh.triangle_count // 20_000)]
@@ -147,6 +147,12 @@ def test_lights_come_from_all_around() -> None:
         azimuths.append(math.atan2(light.direction[2], light.direction[0]))
     gaps = np.diff(np.sort([*azimuths, min(azimuths) + 2 * math.pi]))
     assert gaps.max() < 2 * (2 * math.pi / 32)
+
+
+def test_lights_of_blinds_shine_through_the_windows() -> None:
+    for light in blinds(lights=32).lights:
+        assert isinstance(light, DirectionalLight)
+        assert light.direction[0] > 0.1
 
 
 def test_more_lights_change_nothing_else() -> None:

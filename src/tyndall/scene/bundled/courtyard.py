@@ -37,7 +37,7 @@ from tyndall.scene.bundled.primitives import (
     translation,
     tube,
 )
-from tyndall.scene.bundled.sunlight import GOLDEN_ANGLE, Options, suns
+from tyndall.scene.bundled.sunlight import Options, suns
 from tyndall.scene.model import Camera, HenyeyGreenstein, Instance, Material, Medium, Scene, Texture, Vec3
 
 TRIANGLES = 5_608_441
@@ -50,6 +50,7 @@ EAVE, RIDGE = (5.55, 4.3), (9.35, 5.6)  # distance from the axis and height of t
 CROWN_LEAVES, IVY_LEAVES = 400_000, 280_000
 TREES = ((-2.9, -2.3, 0.4), (3.0, 1.2, 2.1))  # x, z, turn
 SUN: Vec3 = (0.36, -0.74, 0.50)
+GOLDEN_ANGLE = math.pi * (3 - math.sqrt(5))
 SIDES = tuple(rotation("y", k * math.pi / 2) for k in range(4))
 
 Rng = np.random.Generator

@@ -144,12 +144,12 @@ def chalkboard(rng: Generator, name: str, strokes: list[Floats], aspect: float, 
     for stroke in strokes:
         step = np.hypot(*np.diff(stroke, axis=0).T)
         travelled = np.concatenate([[0], np.cumsum(step)])
-        count = int(travelled[-1] * size * 6)
+        count = int(travelled[-1] * size * 9)
         at = np.linspace(0, travelled[-1], count)
         line = np.stack(
             [np.interp(at, travelled, stroke[:, 0]) / aspect, 1 - np.interp(at, travelled, stroke[:, 1])], 1
         )
-        line = line * size + rng.normal(0, 0.8, (count, 2)) * (1 / aspect, 1)
+        line = line * size + rng.normal(0, size / 600, (count, 2)) * (1 / aspect, 1)
         x, y = (np.clip(line[:, i].astype(int), 0, size - 1) for i in (0, 1))
         np.add.at(chalk, (y, x), 0.55 * rng.random(count))
     slate = mix((0.13, 0.19, 0.17), (0.31, 0.37, 0.35), 0.35 + 0.2 * wiped)
