@@ -41,7 +41,7 @@ class Froxel(Technique):
     far: float = param(
         0.0, 0, None, "view depth where the grid ends; 0: the far side of the medium (physical)", unit="m"
     )
-    samples: int = param(1, 1, 16, "light samples along a froxel (physical)")
+    samples: int = param(2, 1, 16, "light samples along a froxel (physical)")
     jitter: float = param(0.0, 0, 1, "random shift of the samples, changing every frame (physical)", unit="froxel")
     z_limit: float = param(
         0.0, 0, None, "view depth where the grid ends; 0: the far side of the scene (paper)", unit="m"
