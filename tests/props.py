@@ -133,6 +133,81 @@ def hit_box(origin: ArrayLike, directions: ArrayLike, low: ArrayLike, high: Arra
     return np.fmax.reduce(np.fmin(a, b), axis=-1), np.fmin.reduce(np.fmax(a, b), axis=-1)
 
 
+@dataclass(frozen=True)
+class Hit:
+    """Where rays meet a scene first: distance (…), inf for none; face normal towards the ray (…, 3); uv (…, 2)."""
+
+    distance: Floats
+    normal: Floats
+    uv: Floats
+    instance: NDArray[np.int64]
+
+
+def cast(scene: Scene, origins: ArrayLike, directions: ArrayLike, *, skip_holes: bool = True) -> Hit:
+    """Intersect rays with all triangles of a scene (Möller and Trumbore 1997), by brute force.
+
+    With ``skip_holes`` a masked material's texels below the cutoff, looked up without filtering, let the ray pass.
+    """
+    directions = np.asarray(directions, float)
+    origins = np.broadcast_to(np.asarray(origins, float), directions.shape)
+    best = Hit(
+        np.full(directions.shape[:-1], np.inf),
+        np.zeros(directions.shape),
+        np.zeros((*directions.shape[:-1], 2)),
+        np.full(directions.shape[:-1], -1),
+    )
+    for number, instance in enumerate(scene.instances):
+        matrix, mesh = np.asarray(instance.transform), instance.mesh
+        world = mesh.positions.astype(float) @ matrix[:3, :3].T + matrix[:3, 3]
+        for corners in mesh.indices:
+            a, b, c = world[corners]
+            e1, e2 = b - a, c - a
+            p = np.cross(directions, e2)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                inverse = 1 / (p @ e1)
+                s = origins - a
+                u = (s * p).sum(-1) * inverse
+                q = np.cross(s, e1)
+                v = (q * directions).sum(-1) * inverse
+                t = (q @ e2) * inverse
+                found = (u >= 0) & (v >= 0) & (u + v <= 1) & (t > 1e-6) & (t < best.distance)
+            uv = np.zeros((*found.shape, 2))
+            if mesh.uvs is not None:
+                ua, ub, uc = mesh.uvs[corners].astype(float)
+                uv[found] = ua + u[found, None] * (ub - ua) + v[found, None] * (uc - ua)
+            material = mesh.material
+            if skip_holes and material.alpha_mode == "mask":
+                found &= _alpha(material, uv) >= material.alpha_cutoff
+            n = np.cross(e1, e2)
+            n = n / np.linalg.norm(n) * np.where((directions @ n) > 0, -1.0, 1.0)[..., None]
+            best.distance[found], best.normal[found] = t[found], n[found]
+            best.uv[found], best.instance[found] = uv[found], number
+    return best
+
+
+def _alpha(material: Material, uv: Floats) -> Floats:
+    alpha = np.full(uv.shape[:-1], material.base_color[3])
+    if material.base_color_texture is not None:
+        pixels = material.base_color_texture.image.pixels
+        x = np.floor(uv[..., 0] % 1 * pixels.shape[1]).astype(int)
+        y = np.floor(uv[..., 1] % 1 * pixels.shape[0]).astype(int)
+        alpha = alpha * pixels[y, x, 3] / 255
+    return alpha
+
+
+def lit(scene: Scene, light: Light, points: Floats) -> NDArray[np.bool_]:
+    """Whether nothing of the scene stands between points (…, 3) and a light."""
+    if isinstance(light, DirectionalLight):
+        towards = np.broadcast_to(-np.array(light.direction) / np.linalg.norm(light.direction), points.shape)
+        reach = np.full(points.shape[:-1], np.inf)
+    else:
+        way = np.array(light.position) - points
+        reach = np.linalg.norm(way, axis=-1)
+        towards = way / reach[..., None]
+    start = points + 1e-4 * towards
+    return cast(scene, start, towards).distance >= reach - 2e-4
+
+
 def phase(model: Phase, cosine: ArrayLike) -> Floats:
     """Phase functions as in their papers, 1/sr."""
     c = np.asarray(cosine, float)
@@ -222,7 +297,7 @@ def reflected(
     def dot(a: Floats, b: Floats) -> Floats:
         return (a * b).sum(-1, keepdims=True)
 
-    n_l, n_v, n_h, l_h = dot(n, l), np.abs(dot(n, v)), dot(n, h), dot(l, h)
+    n_l, n_v, n_h, l_h = np.maximum(dot(n, l), 0), np.maximum(np.abs(dot(n, v)), 1e-4), dot(n, h), dot(l, h)
     a2 = max(material.roughness**2, 2e-3) ** 2
     d = a2 / (np.pi * (n_h**2 * (a2 - 1) + 1) ** 2)
     g = 0.5 / (n_l * np.sqrt(n_v**2 * (1 - a2) + a2) + n_v * np.sqrt(n_l**2 * (1 - a2) + a2))
@@ -233,8 +308,8 @@ def reflected(
     return np.where(n_l > 0, (through * color * (1 - material.metallic) / np.pi + f * d * g) * n_l, 0.0)
 
 
-def surface_light(scene: Scene, size: tuple[int, int], normal: Vec3, distance: ArrayLike) -> Floats:
-    """Unshadowed radiance (H, W, 3) of a plane of the first instance's material at a distance along the rays."""
+def surface_light(scene: Scene, size: tuple[int, int], normal: ArrayLike, distance: ArrayLike) -> Floats:
+    """Unshadowed radiance (H, W, 3) of the first instance's material, of normals (…, 3), at distances."""
     seen = rays(scene.camera, size)
     material = scene.instances[0].mesh.material
     total = np.zeros((*seen.stretch.shape, 3)) + np.array(scene.ambient) * material.base_color[:3] + material.emissive

@@ -1,0 +1,245 @@
+"""What every shadow technique must get right: its answer against rays cast through the same triangles."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import props
+import pytest
+from props import WHITE, shoot
+
+from tyndall.gpu.device import Gpu
+from tyndall.scene.model import (
+    Camera,
+    DirectionalLight,
+    Image,
+    Instance,
+    Light,
+    Material,
+    PointLight,
+    Scene,
+    SpotLight,
+    Texture,
+)
+from tyndall.techniques import FAMILIES, Technique
+
+FAMILY = FAMILIES["shadow"]
+ALL = tuple(FAMILY.members)
+SIZE = (96, 72)
+ABOVE = Camera((2.5, 4, 4.5), (0, 0.3, 0), fov=0.8, near=0.05)
+MAPS: dict[str, dict[str, Any]] = {"shadow_map": {"size": 1024}}
+
+LIGHTS: list[Any] = [
+    pytest.param(DirectionalLight((0.5, -1.0, -0.35), 3.0), id="directional"),
+    pytest.param(DirectionalLight((1.0, -0.35, 0.2), 3.0), id="low sun"),
+    pytest.param(DirectionalLight((0, -1, 0), 3.0), id="zenith"),
+    pytest.param(PointLight((-1.2, 2.2, 0.9), 20.0), id="point"),
+    pytest.param(SpotLight((-1.5, 3.0, 0.5), (0.5, -1, -0.15), 40.0, (1, 1, 1), 0.5, 0.7), id="spot"),
+]
+
+
+def make(name: str, **changes: Any) -> Technique:
+    return FAMILY.make(name, changes={**MAPS.get(name, {}), **changes})
+
+
+def seen_visibility(
+    gpu: Gpu, scene: Scene, technique: Technique, size: tuple[int, int] = SIZE
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, props.Hit]:
+    """(visibility, where it can be told, points, hit): drawn light over the closed form of the unshadowed surface."""
+    (light,) = scene.lights
+    seen = props.rays(scene.camera, size)
+    hit = props.cast(scene, seen.origin, seen.directions)
+    distance = np.where(np.isfinite(hit.distance), hit.distance, 1)
+    full = props.surface_light(scene, size, hit.normal, distance)[..., 0]
+    base = shoot(gpu, scene, size, shadow=technique).base[..., 0]
+    # Not where the light grazes, nor at a silhouette, where the pixel's centre may be rasterised either way.
+    depth = shoot(gpu, scene, size).depth * seen.stretch
+    onto = np.isfinite(hit.distance) & np.isfinite(depth)
+    sure = onto & (np.abs(np.where(onto, depth, 0) - distance) < 1e-3 * distance)
+    _, travels = props.arriving(light, 0.0, seen.at(distance))
+    cosine = -(travels * hit.normal).sum(-1)
+    assert not base[sure & (cosine < -0.05)].any(), "what faces away from the light is dark"
+    sure &= (full > 0.02 * full.max()) & (cosine > 0.05)
+    return np.where(sure, base / np.where(sure, full, 1), 0), sure, seen.at(distance), hit
+
+
+CUBE = props.box((-0.5, 0.4, -0.5), (0.5, 1.4, 0.5))
+
+
+@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize("light", LIGHTS)
+def test_a_cube_over_a_plane_as_rays_see_it(gpu: Gpu, name: str, light: Light) -> None:
+    scene = Scene([props.floor(0, 4), CUBE], [light], ABOVE)
+    visible, sure, points, _ = seen_visibility(gpu, scene, make(name))
+    truth = props.lit(scene, light, points)
+    assert (truth & sure).sum() > 500
+    assert (~truth & sure).sum() > 50
+    agree = (visible > 0.5) == truth
+    assert agree[sure].mean() >= 0.99
+    # A few texels away from an edge every pixel agrees: no acne, no leak.
+    texel = 10 / 1024 if light.kind == "directional" else 6 / 1024
+    firm = sure.copy()
+    for axis in range(3):
+        for step in (-4 * texel, 4 * texel):
+            moved = points + step * np.eye(3)[axis]
+            moved[..., 1] = np.maximum(moved[..., 1], 0)
+            firm &= props.lit(scene, light, moved) == truth
+    floor = firm & (points[..., 1] < 1e-3)
+    assert floor.sum() > 500
+    assert agree[floor].all()
+    assert np.abs(visible - truth)[floor].max() < 0.02
+
+
+@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize("elevation", [85, 60, 45, 30, 15, 6])
+@pytest.mark.parametrize("azimuth", [0.0, 0.7])
+def test_no_acne_on_a_plane(gpu: Gpu, name: str, elevation: float, azimuth: float) -> None:
+    e = math.radians(elevation)
+    light = DirectionalLight((math.cos(e) * math.cos(azimuth), -math.sin(e), math.cos(e) * math.sin(azimuth)), 5.0)
+    scene = Scene([props.floor(0, 4), props.box((-4, -2, -4), (4, -1, 4))], [light], ABOVE)
+    visible, sure, _, _ = seen_visibility(gpu, scene, make(name))
+    assert sure.mean() > 0.6
+    assert visible[sure].mean() >= 0.999
+    assert visible[sure].min() >= 0.98
+
+
+@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize("position", [(0, 2.0, 0), (1.5, 1.0, -1.0)])
+def test_the_faces_of_a_point_light_meet_without_a_seam(
+    gpu: Gpu, name: str, position: tuple[float, float, float]
+) -> None:
+    """A light in an empty room lights all of it, edges and corners of its cube map included."""
+    room = props.box((-3, 0, -3), (3, 4, 3), replace(WHITE, double_sided=True))
+    corner = Camera((-2.5, 3.5, -2.4), (2.0, 0.8, 2.1), fov=1.9, near=0.05)
+    scene = Scene([room], [PointLight(position, 20.0)], corner)
+    visible, sure, points, hit = seen_visibility(gpu, scene, make(name))
+    assert sure.mean() > 0.8
+    assert visible[sure].mean() >= 0.999
+    assert visible[sure].min() >= 0.95
+    way = points - np.array(position)
+    largest = np.sort(np.abs(way), axis=-1)
+    on_seam = sure & (largest[..., 2] - largest[..., 1] < 0.05)
+    assert on_seam.sum() > 20, "the picture must show seams"
+    assert len(np.unique(hit.normal.reshape(-1, 3).round(), axis=0)) >= 3
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_a_shadow_across_the_faces_of_a_point_light(gpu: Gpu, name: str) -> None:
+    """A bar that stands over a seam of the cube map throws one shadow."""
+    light = PointLight((0, 2, 0), 20.0)
+    bar = props.box((0.9, 0.9, -0.2), (1.2, 1.2, 1.6))  # direction (1, −1, ·): between +X and −Y
+    scene = Scene([props.floor(0, 4), bar], [light], ABOVE)
+    visible, sure, points, _ = seen_visibility(gpu, scene, make(name))
+    truth = props.lit(scene, light, points)
+    assert (~truth & sure).sum() > 50
+    assert ((visible > 0.5) == truth)[sure].mean() >= 0.99
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_a_spot_light_fades_at_its_cone(gpu: Gpu, name: str) -> None:
+    """The map's border does not show: inside the cone everything is lit, outside all is dark by the falloff alone."""
+    light = SpotLight((0.3, 3.0, 0.2), (0.1, -1, 0.05), 30.0, (1, 1, 1), 0.35, 0.6)
+    scene = Scene([props.floor(0, 4)], [light], ABOVE)
+    visible, sure, _, _ = seen_visibility(gpu, scene, make(name))
+    assert 200 < sure.sum() < 0.8 * sure.size
+    assert visible[sure].min() >= 0.98
+    seen = props.rays(ABOVE, SIZE)
+    hit = props.cast(scene, seen.origin, seen.directions)
+    onto = np.isfinite(hit.distance)
+    expected = props.surface_light(scene, SIZE, hit.normal, np.where(onto, hit.distance, 1))[..., 0]
+    base = shoot(gpu, scene, SIZE, shadow=make(name)).base[..., 0]
+    np.testing.assert_allclose(base[onto], expected[onto], atol=0.01 * expected.max())
+    assert (base[onto] == 0).any()
+
+
+CULLING = [("none", 0.99), ("back", 0.99), ("front", 0.985)]
+
+
+@pytest.mark.parametrize(("cull", "share"), CULLING)
+def test_any_culling_is_right_for_a_closed_caster(gpu: Gpu, cull: str, share: float) -> None:
+    light = DirectionalLight((0.5, -1.0, -0.35), 3.0)
+    scene = Scene([props.floor(0, 4), CUBE], [light], ABOVE)
+    visible, sure, points, _ = seen_visibility(gpu, scene, make("shadow_map", cull=cull))
+    assert ((visible > 0.5) == props.lit(scene, light, points))[sure].mean() >= share
+
+
+@pytest.mark.parametrize("cull", ["back", "front"])
+def test_a_mirrored_caster_is_culled_by_its_outside(gpu: Gpu, cull: str) -> None:
+    """Mirroring turns the winding round; the shadow must not notice."""
+    light = DirectionalLight((0.5, -1.0, -0.35), 3.0)
+    mirror = ((-1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1))
+    technique = make("shadow_map", cull=cull)
+    plain = shoot(gpu, Scene([props.floor(0, 4), CUBE], [light], ABOVE), SIZE, shadow=technique)
+    turned = Scene([props.floor(0, 4), Instance(CUBE.mesh, mirror)], [light], ABOVE)
+    np.testing.assert_allclose(shoot(gpu, turned, SIZE, shadow=technique).base, plain.base, atol=1e-3)
+
+
+def test_culling_back_faces_of_an_open_sheet_leaves_it_out(gpu: Gpu) -> None:
+    """A sheet that turns its back to the light is drawn with 'none', left out with 'back', drawn with 'front'."""
+    light = DirectionalLight((0, -1, 0), 3.0)
+    sheet = props.quad((-1, 1, -1), (1, 1, -1), (1, 1, 1), (-1, 1, 1))  # faces down
+    scene = Scene([props.floor(0, 4), sheet], [light], ABOVE)
+    floor = props.cast(scene, ABOVE.position, props.rays(ABOVE, SIZE).directions).instance == 0
+    dark = {}
+    for cull in ("none", "back", "front"):
+        base = shoot(gpu, scene, SIZE, shadow=make("shadow_map", cull=cull)).base[..., 0]
+        dark[cull] = int((base < 0.1)[floor].sum())
+    assert dark["none"] == dark["front"] > 300
+    assert dark["back"] == 0
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_holes_of_a_masked_caster_let_the_light_through(gpu: Gpu, name: str) -> None:
+    pixels = np.full((4, 4, 4), 255, np.uint8)
+    pixels[::2, ::2, 3] = pixels[1::2, 1::2, 3] = 0
+    mask = Material(
+        "mask", (1, 1, 1, 1), alpha_mode="mask", base_color_texture=Texture(Image(pixels), filter="nearest")
+    )
+    sheet = props.quad((-1, 1, 1), (1, 1, 1), (1, 1, -1), (-1, 1, -1), mask)
+    light = DirectionalLight((0.2, -1.0, -0.1), 3.0)
+    scene = Scene([props.floor(0, 4), sheet], [light], ABOVE)
+    visible, sure, points, hit = seen_visibility(gpu, scene, make(name))
+    floor = sure & (hit.instance == 0)
+    truth = props.lit(scene, light, points)
+    assert ((visible > 0.5) == truth)[floor].mean() >= 0.985
+    under = floor & (np.abs(points[..., [0, 2]]) < 0.8).all(-1)
+    assert 0.3 < truth[under].mean() < 0.7
+
+
+def test_filters_differ_at_edges_only(gpu: Gpu) -> None:
+    light = DirectionalLight((0.5, -1.0, -0.35), 3.0)
+    scene = Scene([props.floor(0, 4), CUBE], [light], ABOVE)
+    coarse = {"size": 128}
+    hard, sure, _, _ = seen_visibility(gpu, scene, make("shadow_map", filtering="nearest", **coarse))
+    soft, _, _, _ = seen_visibility(gpu, scene, make("shadow_map", filtering="linear", **coarse))
+    between = (hard > 0.02) & (hard < 0.98) & sure
+    assert not between.any(), "one texel's answer is yes or no"
+    graded = (soft > 0.02) & (soft < 0.98) & sure
+    assert 20 < graded.sum() < 0.2 * sure.sum()
+    assert np.abs(hard - soft)[sure & ~graded].max() < 0.02
+
+
+def test_the_edge_sharpens_with_the_map(gpu: Gpu) -> None:
+    light = DirectionalLight((0.5, -1.0, -0.35), 3.0)
+    scene = Scene([props.floor(0, 4), CUBE], [light], ABOVE)
+    wrong = []
+    for size in (64, 256, 1024):
+        visible, sure, points, _ = seen_visibility(gpu, scene, make("shadow_map", size=size))
+        wrong.append(np.abs(visible - props.lit(scene, light, points))[sure].mean())
+    assert wrong[1] < 0.5 * wrong[0]
+    assert wrong[2] < 0.5 * wrong[1]
+
+
+def test_what_the_map_does_not_show_is_lit(gpu: Gpu) -> None:
+    """A spot light's map covers its cone; the air and surfaces beside it are not shaded by the map's border."""
+    light = SpotLight((0, 3, 0), (0, -1, 0), 30.0, (1, 1, 1), 0.2, 0.4)
+    beside = props.box((1.8, 0.2, -0.4), (2.4, 0.8, 0.4))
+    scene = Scene([props.floor(0, 4), beside], [light], ABOVE)
+    empty = Scene([props.floor(0, 4)], [light], ABOVE)
+    hit = props.cast(scene, ABOVE.position, props.rays(ABOVE, SIZE).directions)
+    same = hit.instance != 1
+    with_box, without = (shoot(gpu, s, SIZE, shadow=make("shadow_map")).base for s in (scene, empty))
+    np.testing.assert_allclose(with_box[same], without[same], atol=2e-3 * without.max())
