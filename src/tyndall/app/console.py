@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
 _WIDE = 150
 _HOLD_SECONDS = 2.0
+_MOST_LINES = 9
 
 
 def print_result(renderable: RenderableType | str) -> None:
@@ -23,9 +24,13 @@ def print_result(renderable: RenderableType | str) -> None:
     Console(width=None if sys.stdout.isatty() else _WIDE, highlight=False, soft_wrap=False).print(renderable)
 
 
-def say(line: str) -> None:
-    """One line on stderr."""
-    print(f"tyndall: {line}", file=sys.stderr)
+def say(text: str) -> None:
+    """Lines on stderr; of many, the first ones, and how many more there are."""
+    lines = text.splitlines()
+    if len(lines) > _MOST_LINES + 1:
+        lines[_MOST_LINES:] = [f"… and {len(lines) - _MOST_LINES} more"]
+    for line in lines:
+        print(f"tyndall: {line}", file=sys.stderr)
 
 
 class Work:
@@ -56,6 +61,7 @@ class Work:
         self._propagated, self._logger.propagate = self._logger.propagate, False
         self._warnings = warnings.catch_warnings()
         self._warnings.__enter__()
+        warnings.simplefilter("default", UserWarning)
         warnings.showwarning = lambda message, *_, **__: self.note(str(message))
         if console.is_terminal:
             progress.start()
