@@ -152,17 +152,19 @@ class Comparison:
         raise KeyError(label)
 
     def table(self) -> Table:
-        """For a terminal or a notebook, by rich."""
+        """For a terminal of 80 columns or a notebook, by rich."""
         from rich import box
         from rich.table import Table
 
         width, height = self.size
         title = f"{self.scene} · {self.triangles:,} triangles · {width}×{height} · {self.adapter}"
-        table = Table(title=title, caption="\n".join(self._notes()), caption_justify="left", box=box.SIMPLE_HEAD)
+        caption = "\n".join(self._notes())
+        table = Table(title=title, caption=caption, caption_justify="left", box=box.SIMPLE_HEAD, padding=0)
+        table.show_edge = False
         table.add_column("technique", no_wrap=True)
-        for heading in ("GPU ms\nmedian", "\nmin", "\np95", "frame ms\nmedian", "\nmin", "\np95"):
+        for heading in ("GPU ms\nmedian", "\nmin", "\np95", "frame\nmedian", "\nmin", "\np95"):
             table.add_column(heading, justify="right", no_wrap=True)
-        for heading in ("memory\nMiB", "L_v rel.\nRMSE", "L_v\nbias", "PSNR\ndB"):
+        for heading in ("memory\nMiB", "L_v rel\nRMSE %", "L_v\nbias %", "PSNR\ndB"):
             table.add_column(heading, justify="right", no_wrap=True)
         for result in self.results:
             technique, frame = result.measurement.technique("volumetric"), result.measurement.frame
@@ -171,7 +173,7 @@ class Comparison:
                 result.technique + ("*" if result.model == "paper" else ""),
                 *(_milliseconds(ms) for t in (technique, frame) for ms in (t.median, t.min, t.p95)),
                 f"{result.memory_bytes / 2**20:.2f}",
-                *((_percent(error.rel_rmse), _percent(error.bias, "+"), f"{error.psnr:.1f}") if error else "–––"),
+                *(_scores(error) if error else "–––"),
             )
         return table
 
@@ -465,5 +467,9 @@ def _milliseconds(ms: float) -> str:
     return f"{ms:.3f}" if ms < 1 else f"{ms:.2f}" if ms < 10 else f"{ms:.1f}" if ms < 100 else f"{ms:.0f}"
 
 
-def _percent(fraction: float, sign: str = "") -> str:
-    return f"{100 * fraction:{sign}.2f} %"
+def _scores(error: Error) -> tuple[str, str, str]:
+    return f"{100 * error.rel_rmse:.2f}", f"{100 * error.bias:+.2f}", f"{error.psnr:.1f}"
+
+
+def _percent(fraction: float) -> str:
+    return f"{100 * fraction:.2f} %"
