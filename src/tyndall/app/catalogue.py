@@ -78,6 +78,8 @@ def techniques_table(techniques: list[tuple[str, type[Technique]]]) -> Renderabl
         parts.append(Padding(Text.from_markup("\n".join(about)), (0, 0, 0, 2)))
         if fields := fields_of(technique):
             table = Table(box=None, show_header=False, padding=(0, 2, 0, 0))
+            table.add_column(no_wrap=True)
+            table.add_column(no_wrap=True)
             for f in fields:
                 table.add_row(
                     f"[green]--{name}.{f.name}[/]",

@@ -19,16 +19,14 @@ GET_SOFTWARE = "apt-get install mesa-vulkan-drivers"
 
 # What an adapter is used for, and what happens without it.
 FEATURES = {
-    "timestamp-query": "times of the passes; without it only the host's time is known",
-    "float32-blendable": "exact sums of the polygonal technique; without it half floats add up",
-    "shader-f16": "half-precision arithmetic in shaders",
-    "subgroup": "reductions inside a subgroup",
+    "timestamp-query": "times the passes; without it no GPU times",
+    "float32-blendable": "the polygonal technique needs it",
 }
 LIMITS = {
-    "max-texture-dimension-2d": "largest picture and shadow map, pixels a side",
-    "max-texture-dimension-3d": "largest froxel grid, froxels a side",
+    "max-texture-dimension-2d": "pixels a side of a picture or a shadow map",
+    "max-texture-dimension-3d": "froxels a side of a grid",
     "max-texture-array-layers": "shadow maps in one array",
-    "max-storage-buffer-binding-size": "bytes of a mesh in one binding; larger meshes are split",
+    "max-storage-buffer-binding-size": "bytes in a binding; larger meshes are split",
     "max-buffer-size": "bytes in one buffer",
 }
 PACKAGES = ("tyndall", "wgpu", "wesl-py", "rendercanvas", "numpy", "pydantic", "typer", "rich", "pillow", "OpenEXR")
@@ -94,15 +92,17 @@ class Report:
 
     def table(self) -> RenderableType:
         from rich.console import Group
+        from rich.markup import escape
         from rich.table import Table
         from rich.text import Text
 
         parts: list[RenderableType] = []
         for adapter in self.adapters:
             mark = "[green]●[/]" if adapter.chosen else "[dim]○[/]"
-            title = f"{mark} [bold]{adapter.name}[/]  {adapter.kind}, {adapter.backend}"
-            table = Table(title=title, title_justify="left", box=None, show_header=False, padding=(0, 2))
-            table.add_row("driver", adapter.driver or "unknown", "")
+            parts.append(Text.from_markup(f"{mark} [bold]{escape(adapter.name)}[/]  {adapter.kind}, {adapter.backend}"))
+            parts.append(Text(f"  driver: {adapter.driver or 'unknown'}", style="dim"))
+            table = Table(box=None, show_header=False, padding=(0, 0, 0, 2))
+            table.add_column(no_wrap=True)
             for name, why in FEATURES.items():
                 table.add_row(name, "[green]yes[/]" if adapter.features[name] else "[yellow]no[/]", f"[dim]{why}[/]")
             for name, why in LIMITS.items():
@@ -110,7 +110,7 @@ class Report:
             parts += [table, Text()]
         parts.append(Text.from_markup(f"[bold]Python[/] {self.python} on {self.system}"))
         parts.append(Text(", ".join(f"{name} {version or 'missing'}" for name, version in self.packages.items())))
-        parts += [Text.from_markup(f"[yellow]![/] {line}") for line in self.missing]
+        parts += [Text.from_markup(f"[yellow]![/] {escape(line)}") for line in self.missing]
         verdict = "[green]Tyndall can draw here.[/]" if self.can_render else "[red]Tyndall cannot draw here.[/]"
         parts.append(Text.from_markup(verdict))
         return Group(*parts)
@@ -143,9 +143,7 @@ def diagnose(adapter: str | None = None) -> Report:
         if not found:
             missing.append(f"no graphics adapter answers: install your GPU's driver, or {GET_SOFTWARE}")
         elif all(a.kind == "CPU" for a in adapters):
-            missing.append(
-                "no GPU answers, so pictures come from the slower software adapter: install its Vulkan driver"
-            )
+            missing.append("only a software adapter answers, which is slow; with a GPU, install its Vulkan driver")
         if adapters and not any(a.features["timestamp-query"] for a in adapters):
             missing.append("no adapter has timestamp queries: passes cannot be timed")
     python = f"{platform.python_version()} ({sys.executable})"

@@ -194,7 +194,7 @@ class Comparison:
                 f"twice as many change L_v by {_percent(truth.change)}"
             )
         if any(result.model == "paper" for result in self.results):
-            notes.append("* the paper's model has its own units; it is held against the same physical reference")
+            notes.append("* the paper's own units, held against the same physical reference")
         notes += [f"{name}: {reason}" for name, reason in self.skipped.items()]
         return notes
 
