@@ -8,6 +8,7 @@ nothing is written), 130 interrupted.
 from __future__ import annotations
 
 import errno
+import io
 import json
 import os
 import sys
@@ -51,7 +52,7 @@ Lights = Annotated[int | None, typer.Option(metavar="N", help="Number of lights,
 AdapterName = Annotated[
     str | None, typer.Option("--adapter", metavar="NAME", help="Part of an adapter's name; see `tyndall doctor`.")
 ]
-Seed = Annotated[int, typer.Option(metavar="N", min=0, help="Seed of everything random.")]
+Seed = Annotated[int, typer.Option(metavar="N", min=0, max=2**32 - 1, help="Seed of everything random.")]
 Out = Annotated[Path | None, typer.Option(metavar="DIR", help="Folder for the results; out/SCENE if not given.")]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on stdout, and nothing else there.")]
 
@@ -91,7 +92,10 @@ def render(
 ) -> None:
     """Draw one picture: a PNG, and an EXR with linear light and depth."""
     pixels = arguments.parse_size(size)
-    (technique,) = arguments.split_list([technique]) or ("",)
+    names = arguments.split_list([technique])
+    if len(names) != 1:
+        raise ParameterError(f"--technique: '{technique}' is not one technique; compare draws several")
+    technique = names[0]
     families = {"volumetric": technique, **_others(shadow=shadow, antialiasing=antialiasing, tonemap=tonemap)}
     parameters = _parameters(context, [technique], families, model)
     with console.Work("loading") as work:
@@ -262,6 +266,9 @@ def main(words: Sequence[str] | None = None) -> int:
     Args:
         words: the arguments after the program's name; ``sys.argv`` if None.
     """
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")  # a terminal without "×" still gets its result
     words = list(sys.argv[1:] if words is None else words) or ["--help"]
     debug = "--debug" in words
     words = [word for word in words if word != "--debug"]
