@@ -75,13 +75,17 @@ def box(low: Vec3, high: Vec3, material: Material = WHITE) -> Instance:
     first = 4 * np.arange(6)[:, None]
     indices = np.concatenate([first + (0, 1, 2), first + (0, 2, 3)])
     positions = np.concatenate(sides)
-    return Instance(Mesh(positions, indices, np.repeat(_face_normals(positions), 4, axis=0), material=material))
+    return Instance(Mesh(positions, indices, face_normals(positions, indices), material=material))
 
 
-def _face_normals(positions: Floats) -> Floats:
-    a, b, c = positions[0::4], positions[1::4], positions[2::4]
+def face_normals(positions: Floats, indices: NDArray[Any]) -> Floats:
+    """The normals (V, 3) of flat faces that share no vertices."""
+    a, b, c = (positions[indices[:, i]] for i in range(3))
     n = np.cross(b - a, c - a)
-    return n / np.linalg.norm(n, axis=1, keepdims=True)
+    normals = np.zeros_like(positions)
+    for corner in range(3):
+        normals[indices[:, corner]] = n / np.linalg.norm(n, axis=1, keepdims=True)
+    return normals
 
 
 def slits(z: float, half: float, width: float, count: int, material: Material = WHITE) -> list[Instance]:

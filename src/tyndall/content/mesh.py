@@ -109,9 +109,8 @@ class Meshes:
             stop = first + len(matrices)
             world = np.stack(matrices)
             rows["world"][first:stop] = world.transpose(0, 2, 1)
-            # Columns of the inverse transpose are the inverse's rows. Mirroring turns the winding round, so the fragment
-            # shader takes the outside for the back and turns the normal: it is turned here once before.
-            rows["normal"][first:stop, :, :3] = np.linalg.inv(world[:, :3, :3]) * (-1 if mirrored else 1)
+            # Columns of the inverse transpose are the inverse's rows.
+            rows["normal"][first:stop, :, :3] = np.linalg.inv(world[:, :3, :3])
             rows["material"][first:stop] = material_index[id(mesh.material)]
             self._draws.append(
                 _Draw(mesh.material, mirrored, placed[key][0], mesh.indices.size, placed[key][1], first, len(matrices))
