@@ -1,0 +1,117 @@
+"""Every shader of the package compiles, in every combination that the techniques make, and is used by one of them."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import props
+import pytest
+
+from tyndall.frame import Renderer
+from tyndall.gpu.device import Gpu
+from tyndall.gpu.params import fields_of
+from tyndall.scene.model import (
+    DirectionalLight,
+    Image,
+    Instance,
+    Material,
+    Medium,
+    PointLight,
+    Scene,
+    SpotLight,
+    Texture,
+)
+from tyndall.techniques import FAMILIES
+from tyndall.techniques.contract import Unsupported
+
+_ENTRY = re.compile(r"@(?:compute|vertex|fragment)\b(?:\s*@\w+(?:\([^)]*\))?)*\s*fn\s+(\w+)")
+SMALL = {"froxel": {"grid": (8, 6, 4)}, "march": {"steps": 4}, "shadow_map": {"size": 64}}
+
+_pixels = np.full((4, 4, 4), 255, np.uint8)
+_pixels[::2, ::2, 3] = 0
+_leaf = Material("leaf", (1, 1, 1, 1), alpha_mode="mask", base_color_texture=Texture(Image(_pixels)))
+_mirror = ((-1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1))
+SHAPES = [props.floor(-1, 5), Instance(props.box((-1, -1, -4), (0, 0, -3)).mesh, _mirror), props.wall(-5, 2, _leaf)]
+LIGHTS = [
+    DirectionalLight((0.2, -1, 0.4)),
+    PointLight((0, 1, -2)),
+    SpotLight((1, 2, -2), (-0.2, -1, -0.2)),
+]
+
+
+def entry_points(gpu: Gpu) -> set[tuple[str, str]]:
+    """(module, entry point) of the package's WESL files."""
+    return {
+        (module, name)
+        for module, text in gpu.linker.modules.items()
+        if not module.startswith("package::test_")
+        for name in _ENTRY.findall(text)
+    }
+
+
+def variants(family: str) -> list[tuple[str, dict[str, object]]]:
+    """Each technique with its defaults, and once for each value of each text parameter."""
+    found = []
+    for name, cls in FAMILIES[family].members.items():
+        base: dict[str, object] = dict(SMALL.get(name, {}))
+        found.append((name, base))
+        for f in fields_of(cls):
+            choices = getattr(f.type, "__args__", ()) if isinstance(f.default, str) else ()
+            found += [(name, {**base, f.name: choice}) for choice in choices if choice != f.default]
+    return found
+
+
+def test_every_entry_point_compiles_and_is_used(gpu: Gpu) -> None:
+    """Draws with each technique of each family, all kinds of light and of material; then nothing may be left over."""
+    drawn = 0
+    for lights in (LIGHTS, LIGHTS[:1]):
+        scene = Scene(SHAPES, lights, props.AHEAD, Medium(0.1, 0.02))
+        start = {
+            family: FAMILIES[family].make(None, changes=SMALL.get(FAMILIES[family].default)) for family in FAMILIES
+        }
+        with Renderer(scene, (8, 6), gpu=gpu, **start) as renderer:
+            for family in FAMILIES:
+                for name, changes in variants(family):
+                    try:
+                        renderer.use(family, FAMILIES[family].make(name, changes=changes))
+                    except Unsupported:
+                        continue
+                    renderer.draw()
+                    assert np.isfinite(renderer.radiance()).all(), (family, name, changes)
+                    drawn += 1
+                renderer.use(family, start[family])
+    assert drawn >= 2 * 10
+    compiled = {(key[0], entry) for key in gpu._programs for entry in key[1]}
+    left = entry_points(gpu) - compiled
+    assert not left, f"never compiled by any technique: {sorted(left)}"
+
+
+def test_entry_points_are_found(gpu: Gpu) -> None:
+    """The search above sees what there is: every stage, attributes in any order."""
+    found = entry_points(gpu)
+    assert {
+        ("package::frame", "lighting"),
+        ("package::content::mesh", "vertex"),
+        ("package::content::mesh", "fragment"),
+        ("package::techniques::volumetric::froxel", "accumulate"),
+    } <= found
+    text = "@compute\nfn a() {}\n@compute @workgroup_size(8, 8)\nfn b() {}\nfn c() {}\n@vertex fn d() {}"
+    assert _ENTRY.findall(text) == ["a", "b", "d"]
+
+
+def test_every_module_is_imported_or_has_an_entry_point(gpu: Gpu) -> None:
+    """No shader file lies about unused."""
+    texts = {m: t for m, t in gpu.linker.modules.items() if not m.startswith("package::test_")}
+    roots = {module for module, _ in entry_points(gpu)}
+    shadows = {cls.shader() for cls in FAMILIES["shadow"].members.values()}
+    for module in texts.keys() - roots - shadows:
+        users = [m for m, text in texts.items() if re.search(rf"import {module}\b", text)]
+        assert users, f"{module} is imported nowhere"
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_a_technique_has_its_shader_beside_it(gpu: Gpu, family: str) -> None:
+    for cls in FAMILIES[family].members.values():
+        if cls.name != "none" or family == "tonemap":
+            assert cls.shader() in gpu.linker.modules
