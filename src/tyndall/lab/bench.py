@@ -42,7 +42,9 @@ from tyndall.techniques.contract import Technique
 Progress = Callable[[float, str], object]
 Triple = tuple[int, int, int]
 
-TECHNIQUES = ("off", "froxel", "screen_space", "polygonal", "march")
+# As measured: a technique, or "technique/choice" for another of its ways to do the same.
+TECHNIQUES = ("off", "froxel", "screen_space", "polygonal", "polygonal/faces", "march")
+_CHOICES: Mapping[str, Mapping[str, Any]] = {"faces": {"evaluate": "faces"}}
 
 
 @dataclass(frozen=True)
@@ -214,10 +216,10 @@ class _Run:
             scene = self._scene(name)
             digest = scene_hash(scene)
             with self._stage(scene) as stage:
-                for technique in self._techniques(scene):
-                    self._tell(f"{name}, {technique.name}")
+                for label, technique in self._techniques(scene):
+                    self._tell(f"{name}, {label}")
                     row = {"scene": name, "triangles": scene.triangle_count, "scene_hash": digest}
-                    rows.append({**row, **self._row(stage, technique)})
+                    rows.append({**row, **self._row(stage, technique), "technique": label})
         return rows
 
     def lights(self) -> dict[str, Any]:
@@ -226,9 +228,10 @@ class _Run:
         for count in self.settings.lights:
             scene = self._scene("box", count)
             with self._stage(scene) as stage:
-                for technique in self._techniques(scene):
-                    self._tell(f"{count} lights, {technique.name}")
-                    rows.setdefault(technique.name, []).append({"lights": count, **self._row(stage, technique)})
+                for label, technique in self._techniques(scene):
+                    self._tell(f"{count} lights, {label}")
+                    row = {"lights": count, **self._row(stage, technique), "technique": label}
+                    rows.setdefault(label, []).append(row)
         return {
             name: {
                 "rows": measured,
@@ -296,8 +299,12 @@ class _Run:
     def _technique(self, name: str, scene: Scene) -> Technique:
         return make("volumetric", name, scene, self.settings.parameters())
 
-    def _techniques(self, scene: Scene) -> list[Technique]:
-        return [self._technique(name, scene) for name in TECHNIQUES]
+    def _techniques(self, scene: Scene) -> list[tuple[str, Technique]]:
+        made = []
+        for label in TECHNIQUES:
+            name, _, choice = label.partition("/")
+            made.append((label, replace(self._technique(name, scene), _CHOICES.get(choice, {}))))
+        return made
 
     def _scene(self, name: str, lights: int = 1) -> Scene:
         key = (name, lights)
