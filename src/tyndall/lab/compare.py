@@ -189,10 +189,8 @@ class Comparison:
         if self.reference:
             truth = self.reference
             state = "converged" if truth.within else "NOT converged"
-            notes.append(
-                f"reference: {truth.technique}, {truth.steps} steps, {state}: "
-                f"twice as many change L_v by {_percent(truth.change)}"
-            )
+            change = f"doubling changes L_v by {_percent(truth.change)}"
+            notes.append(f"reference: {truth.technique}, {truth.steps} steps, {state} ({change})")
         if any(result.model == "paper" for result in self.results):
             notes.append("* the paper's own units, held against the same physical reference")
         notes += [f"{name}: {reason}" for name, reason in self.skipped.items()]
