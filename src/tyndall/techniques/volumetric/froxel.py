@@ -10,9 +10,10 @@ scene, or ``far``), clipped to the medium's box; what lies beyond the last slice
 a shadow map.
 
 ``model="paper"`` is S1's equations 10–12: ``L = L_c·V·ρ(g)·C_s·density·D(k)``, summed without extinction and added to
-an unattenuated base image; slices are uniform in clip-space depth between the near plane and ``z_limit`` (S1's
-projection is standard-Z), light intensity is not dimmed by the medium, and a pixel takes the value of its froxel's
-layer. Where ``z_limit`` is 0 it is the far side of the scene.
+an unattenuated base image; light is not dimmed by the medium, only directional lights are known, and a pixel takes
+the value of its froxel's layer. Slices are uniform in view depth, ``z_k = k·z_limit/D``: that is what equation 10
+says, which scales a homogeneous vector. (Its prose says uniform in clip depth, which would put 127 of 128 slices into
+the first 1.3 m of a view whose near plane is at 1 cm.) Where ``z_limit`` is 0 it is the far side of the scene.
 """
 
 from __future__ import annotations

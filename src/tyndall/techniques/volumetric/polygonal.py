@@ -12,17 +12,18 @@ light's near plane needs no cap, as the air around the map is lit; and the first
 shadow. For directional lights ``G`` is a closed form; for point lights (six maps) and spot lights it is a quadrature
 in every fragment, several times as dear.
 
-There are two ways to find the faces that a ray meets (``evaluate``). ``"faces"`` draws the mesh with additive blending,
-as the papers do: for every light, but each of many overlapping faces is a fragment of every pixel behind it, so fine
-structure between the light and the air costs tens of milliseconds. ``"walk"`` follows each pixel's ray through the map
-in compute, each texel a flat face with upright sides; blocks of 4², 16² and 64² texels that the ray passes wholly above
-or below are one step (after the min–max maps of Chen 2011; they take 0.53 MiB a light for a map of 1024²). It serves
-directional lights; point and spot lights are drawn.
+There are two ways to find the faces that a ray meets (``evaluate``). ``"faces"`` draws the mesh with additive
+blending, as the papers do: for every light, but each of many overlapping faces is a fragment of every pixel behind
+it, so fine structure between the light and the air costs tens of milliseconds. ``"walk"`` follows each pixel's ray
+through the map in compute, each texel a flat face with upright sides; blocks of 4², 16² and 64² texels that the ray
+passes wholly above or below are one step (after the min–max maps of Chen 2011; they take 0.53 MiB a light for a map
+of 1024²). It serves directional lights; point and spot lights are drawn.
 
 ``model="paper"`` is S1's equation 9: ``L_c·ρ(g)·(1 − e^(−τd))/τ``, without σs, for every face of the mesh, far plane
 included, without depth test, added where the ray leaves the lit volume and subtracted where it enters it, ``d``
-clamped at the surface behind the pixel; the sides of the map and its near plane stay open, and the base image is not
-attenuated. The equation is one of parallel light: other lights are refused.
+clamped at the surface behind the pixel; the base image is not attenuated. The paper's mesh is a sheet; here its
+border stands up to the near plane and a cap closes it there, without which most rays would leave the volume unseen
+and their sums be negative. The equation is one of parallel light: other lights are refused.
 """
 
 from __future__ import annotations
