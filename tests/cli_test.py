@@ -177,6 +177,14 @@ def test_a_mesh_file_is_put_on_a_stage(capsys: pytest.CaptureFixture[str], folde
     assert pixels_of(folder / document["image"]).std() > 1
 
 
+def test_a_name_in_a_scene_file_does_not_choose_the_folder(capsys: pytest.CaptureFixture[str], folder: Path) -> None:
+    scene = tyndall.Scene(lights=(tyndall.DirectionalLight(),), name="../../elsewhere")
+    tyndall.save(scene, folder / "beam.json")
+    document = run_json(capsys, "render", "beam.json", "--size", "16x9", "--frames", "1", "--technique", "off")
+    assert document["image"] == "out/beam/off.png"
+    assert {p.name for p in folder.iterdir() if p.suffix != ".bin"} == {"beam.json", "out"}
+
+
 def test_lights_are_placed_in_a_bundled_scene(capsys: pytest.CaptureFixture[str], folder: Path) -> None:
     images = [
         run_json(capsys, "render", "box", "--lights", n, "--size", "16x9", "--frames", "1", "--out", n)["image"]

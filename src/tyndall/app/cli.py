@@ -100,7 +100,7 @@ def render(
     parameters = _parameters(context, [technique], families, model)
     with console.Work("loading") as work:
         described = open_scene(scene, lights)
-        folder = out or Path("out", described.name)
+        folder = out or Path("out", Path(scene).stem)  # not the name in a file, which may be a path
         from tyndall.lab.compare import check_folder
         from tyndall.lab.render import render as draw
 
@@ -173,7 +173,7 @@ def compare(
     parameters = _parameters(context, chosen or list(FAMILIES["volumetric"].members), others)
     with console.Work("loading") as work:
         described = open_scene(scene, lights)
-        folder = out or Path("out", described.name)
+        folder = out or Path("out", Path(scene).stem)  # not the name in a file, which may be a path
         from tyndall.lab.compare import compare as measure
 
         comparison = measure(
@@ -269,12 +269,12 @@ def main(words: Sequence[str] | None = None) -> int:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a terminal without "×" still gets its result
-    words = list(sys.argv[1:] if words is None else words) or ["--help"]
+    words = list(sys.argv[1:] if words is None else words)
     debug = "--debug" in words
     words = [word for word in words if word != "--debug"]
     try:
         rest, flags = arguments.split_flags(words)
-        code = app(rest, prog_name="tyndall", standalone_mode=False, obj=flags)
+        code = app(rest or ["--help"], prog_name="tyndall", standalone_mode=False, obj=flags)
         sys.stdout.flush()
     except KeyboardInterrupt:
         return INTERRUPTED
