@@ -270,6 +270,38 @@ def test_slits_agree_with_the_march(gpu: Gpu, name: str, tolerance: float, side:
     assert props.difference(got, truth) < tolerance
 
 
+@cache
+def cast_shafts(near: bool) -> tuple[Scene, Any]:
+    """A scene of shafts through boards behind the camera, and its L_v with visibility by rays cast at the triangles."""
+    boards = props.slits(1, 2.5, 0.4, 5)
+    light = PointLight((0.5, 1.0, 3.5), 40.0) if near else DirectionalLight((0.6, -0.3, -0.7), 1.0)
+    camera = Camera((0.4, 0.3, 0), (0, 0, -3), fov=0.9, near=0.05)
+    scene = Scene([*boards, props.wall(-6, 6)], [light], camera, Medium(0.15, 0.05, HenyeyGreenstein(0.4)))
+    seen = props.rays(camera, TINY)
+    distance = -6 / seen.directions[..., 2]
+    count = 250
+    sigma = np.array(scene.medium.extinction)
+    total = np.zeros((*TINY[::-1], 3))
+    for i in range(count):
+        s = distance * (i + 0.5) / count
+        points = seen.at(s)
+        irradiance, travels = props.arriving(light, sigma, points)
+        p = props.phase(scene.medium.phase, -(travels * seen.directions).sum(-1))
+        arrives = props.lit(scene.with_(instances=boards), light, points) * p * distance / count
+        total += arrives[..., None] * irradiance * np.exp(-sigma * s[..., None])
+    return scene, total * scene.medium.scattering
+
+
+@pytest.mark.parametrize("near", [False, True], ids=["sun", "lamp"])
+@pytest.mark.parametrize("name", seeing("off screen"))
+def test_shafts_agree_with_rays_cast_to_the_light(gpu: Gpu, name: str, near: bool) -> None:
+    """The whole chain, shadow map included, against 250 samples a ray that ask the triangles themselves."""
+    scene, expected = cast_shafts(near)
+    assert expected.max() > 2 * expected.min()
+    shot = shoot(gpu, scene, volumetric=make(name), shadow=ShadowMap(size=2048))
+    assert props.difference(shot.inscattered, expected) < 0.02
+
+
 RESOLUTION = {"march": {"steps": 512}, "froxel": {"grid": (*TINY, 128)}, "screen_space": {"samples": 128}}
 
 
