@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import re
+from functools import cache
 from typing import Any, Literal, get_args, get_origin
 
 import numpy as np
