@@ -115,6 +115,7 @@ CASES = [
     ("box", "off", {}),
     ("box", "froxel", {}),
     ("box", "polygonal", {}),
+    ("box", "polygonal", {"model": "paper"}),
     ("box", "froxel", {"model": "paper"}),
 ]
 
