@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from tyndall.content.mesh import DEPTH_FORMAT, GBUFFER_TARGETS, Meshes
 from tyndall.gpu.device import Gpu, GpuError
+from tyndall.gpu.params import ParameterError
 from tyndall.gpu.resources import Resource, Texture
 from tyndall.scene.model import (
     Camera,
@@ -74,7 +75,7 @@ class Renderer:
 
     Raises:
         GpuError: no adapter, or a size beyond its limits.
-        ParameterError: an unknown technique.
+        ParameterError: an unknown technique, or a seed that is not of 32 bits.
         Unsupported: the technique cannot draw this scene.
     """
 
@@ -93,6 +94,8 @@ class Renderer:
     ) -> None:
         if min(size) < 1:
             raise GpuError(f"size: {size[0]}×{size[1]} is not a picture")
+        if not 0 <= seed < 2**32:
+            raise ParameterError(f"seed: {seed} is outside 0 … 4294967295")
         self.scene, self.size, self.seed = scene, size, seed
         chosen = {"volumetric": volumetric, "shadow": shadow, "antialiasing": antialiasing, "tonemap": tonemap}
         techniques = {family: FAMILIES[family].make(name, scene.looks) for family, name in chosen.items()}
@@ -120,9 +123,11 @@ class Renderer:
             stored = name not in (*_TARGETS, "depth")
             usage = " ".join(["sampled", *(["target"] if drawn else []), *(["storage"] if stored else [])])
             self._images[name] = gpu.texture(f"frame.{name}", size, format, owner=OWNER, usage=usage)
+            self._resources.append(self._images[name])
+        self._resolved = self._images["lit"]
         black = gpu.texture("frame.black", (1, 1), "rgba32float", owner=OWNER, usage="sampled")
+        self._resources.append(black)
         gpu.write_texture(black, np.zeros((1, 1, 4), np.float32))
-        self._resources += [*self._images.values(), black]
         self._content = [Meshes(gpu, self.scene)]
         self._camera = self._buffer("camera", gpu.dtype(_CAMERA).itemsize, _CAMERA, "uniform")
         self._medium = self._buffer("medium", gpu.dtype(_MEDIUM).itemsize, _MEDIUM, "uniform")
@@ -150,14 +155,25 @@ class Renderer:
         return buffer
 
     def use(self, family: str, technique: str | Technique) -> Technique:
-        """Switch to another technique of a family; the old one's memory is freed."""
+        """Switch to another technique of a family; the old one's memory is freed, and temporal history begins anew:
+        while the camera stands still, the old technique's light would linger in it.
+
+        Raises:
+            ParameterError: an unknown technique.
+            Unsupported: it cannot draw this scene; the one in use stays.
+        """
         made = FAMILIES[family].make(technique, self.scene.looks)
         supports = getattr(made, "supports", None)
         if supports is not None:
             supports(self.scene)
         if family in self._views:
             self._views.pop(family).close()
+            if family == "shadow":
+                for content in self._content:
+                    content.forget_bundles()
             self.gpu.forget_groups()
+            self._history = 0
+            self._resolved = self._images["lit"]
         owner = f"{family}.{made.name}"
         self._views[family] = View(self.gpu, self.scene, self.size, owner, made, self._images)
         return made
@@ -176,8 +192,19 @@ class Renderer:
             jitter: False draws through the pixels' centres whatever the antialiasing technique.
         """
         begin = time.perf_counter()
+        try:
+            self._record(camera or self.scene.camera, jitter)
+        except BaseException:
+            self.gpu.discard()  # half a frame must not precede the next one
+            raise
+        self.gpu.submit()
+        self._frame += 1
+        self._history += 1
+        return (time.perf_counter() - begin) * 1e3
+
+    def _record(self, camera: Camera, jitter: bool) -> None:
         gpu, images = self.gpu, self._images
-        self._update(camera or self.scene.camera, jitter)
+        self._update(camera, jitter)
         scope = self._scope
 
         targets = [(images[name].view(), (0.0, 0.0, 0.0, 0.0)) for name in _TARGETS]
@@ -206,10 +233,6 @@ class Renderer:
         self._resolved = self.technique("antialiasing").render(smooth, images["lit"])
 
         self.technique("tonemap").render(self._view("tonemap", scope), self._resolved, images["picture"])
-        gpu.submit()
-        self._frame += 1
-        self._history += 1
-        return (time.perf_counter() - begin) * 1e3
 
     def _view(self, family: str, scope: dict[str, Any] | None = None, overlay: dict[str, str] | None = None) -> View:
         view = self._views[family]

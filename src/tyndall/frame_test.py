@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import props
@@ -11,7 +13,7 @@ import pytest
 from props import AHEAD, TINY, WHITE, shoot
 
 from tyndall.frame import Renderer, view_matrix
-from tyndall.gpu.device import Gpu
+from tyndall.gpu.device import Gpu, GpuError
 from tyndall.gpu.params import ParameterError
 from tyndall.scene.model import (
     Camera,
@@ -153,6 +155,59 @@ def test_unknown_techniques_are_refused_before_anything_is_made(gpu: Gpu) -> Non
     with pytest.raises(ParameterError, match="shadow_map is not a volumetric technique"):
         Renderer(Scene(), TINY, gpu=gpu, volumetric=ShadowMap())
     assert gpu.ledger.total == before
+
+
+def test_a_technique_that_is_switched_leaves_nothing_in_the_history(gpu: Gpu) -> None:
+    """While the camera stands still nothing is clipped: the old air, or an empty history, would stay for 50 frames."""
+    scene = Scene([props.wall(-4)], [DirectionalLight((0, 0, -1), 3.0)], AHEAD, Medium(0.2))
+    with Renderer(scene, TINY, gpu=gpu, volumetric="march", shadow=ShadowMap(size=64)) as renderer:
+        for _ in range(8):
+            renderer.draw()
+        for family, technique in (("volumetric", "off"), ("antialiasing", "taa")):
+            renderer.use(family, technique)
+            renderer.draw()
+            # No air, and a wall that is the same everywhere.
+            np.testing.assert_allclose(renderer.radiance(), renderer.base(), rtol=2e-3)
+
+
+def test_a_frame_that_fails_leaves_nothing_behind(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = Scene([props.wall(-4)], [DirectionalLight((0, 0, -1))], AHEAD)
+    with Renderer(scene, TINY, gpu=gpu, volumetric="off", shadow=ShadowMap(size=64)) as renderer:
+        renderer.draw()
+        passes = [label for label, _ in gpu.timings()]
+
+        def interrupted(*_: object) -> None:
+            raise KeyboardInterrupt
+
+        with monkeypatch.context() as patch:
+            patch.setattr(type(renderer.technique("tonemap")), "render", interrupted)
+            with pytest.raises(KeyboardInterrupt):
+                renderer.draw()
+        renderer.draw()
+        assert [label for label, _ in gpu.timings()] == passes
+
+
+def test_a_renderer_that_cannot_be_made_leaves_nothing_behind(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
+    before = gpu.ledger.total
+    made = Gpu.texture, Gpu.buffer
+    for name, method in zip(("texture", "buffer"), made, strict=True):
+        for refused in ("frame.lit", "frame.black", "mesh.indices", "mesh.materials", "frame.lights"):
+
+            def limited(self: Gpu, label: str, *args: Any, _method: Any = method, _no: str = refused, **kw: Any) -> Any:
+                if label == _no:
+                    raise GpuError(f"{label}: Not enough memory left.")
+                return _method(self, label, *args, **kw)
+
+            with monkeypatch.context() as patch, contextlib.suppress(GpuError):
+                patch.setattr(Gpu, name, limited)
+                Renderer(Scene([props.wall(-4)]), TINY, gpu=gpu).close()
+            assert gpu.ledger.total == before, refused
+
+
+@pytest.mark.parametrize("seed", [-1, 2**32])
+def test_a_seed_has_32_bits(gpu: Gpu, seed: int) -> None:
+    with pytest.raises(ParameterError, match=f"^seed: {seed} is outside 0 … 4294967295$"):
+        Renderer(Scene(), TINY, gpu=gpu, seed=seed)
 
 
 def test_looks_of_a_scene_are_starting_values(gpu: Gpu) -> None:
