@@ -63,8 +63,12 @@ class Meshes:
         self._buffers: list[Buffer] = []
         self._draws: list[_Draw] = []
         self._maps: dict[int, dict[str, Bound]] = {}
-        if scene.instances:
-            self._upload(scene)
+        try:
+            if scene.instances:
+                self._upload(scene)
+        except BaseException:
+            self.close()
+            raise
 
     def _buffer(self, label: str, data: NDArray[Any] | int, **kwargs: Any) -> Buffer:
         buffer = self._gpu.buffer(f"mesh.{label}", data, owner=OWNER, **kwargs)
@@ -109,8 +113,7 @@ class Meshes:
             stop = first + len(matrices)
             world = np.stack(matrices)
             rows["world"][first:stop] = world.transpose(0, 2, 1)
-            # Columns of the inverse transpose are the inverse's rows.
-            rows["normal"][first:stop, :, :3] = np.linalg.inv(world[:, :3, :3])
+            rows["normal"][first:stop, :, :3] = _normal_columns(world[:, :3, :3])
             rows["material"][first:stop] = material_index[id(mesh.material)]
             self._draws.append(
                 _Draw(mesh.material, mirrored, placed[key][0], mesh.indices.size, placed[key][1], first, len(matrices))
@@ -228,9 +231,13 @@ class Meshes:
             )
         return bundle.finish()
 
+    def forget_bundles(self) -> None:
+        """Drop what was recorded, so that destroyed resources are not kept alive by it."""
+        self._bundles.clear()
+
     def close(self) -> None:
         """Free all device memory."""
-        self._bundles.clear()
+        self.forget_bundles()
         for resource in (*self._buffers, *self._textures.values()):
             resource.destroy()
         self._buffers.clear()
@@ -252,6 +259,17 @@ def _attributes(mesh: Mesh) -> NDArray[Any]:
     if mesh.uvs is not None:
         packed["uv"] = mesh.uvs
     return packed
+
+
+def _normal_columns(world: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(N, 3, 3): columns of the inverse transpose, scaled to 1; a flat transform's normals stand on the flat."""
+    x, y, z = np.moveaxis(world, -1, 0)  # the matrix's columns
+    # The cofactors are the inverse transpose times the determinant, and exist where that is 0.
+    cofactors = np.stack([np.cross(y, z), np.cross(z, x), np.cross(x, y)], axis=1)
+    largest = np.abs(cofactors).max(axis=(1, 2), keepdims=True)
+    sign = np.where(np.linalg.det(world) < 0, -1.0, 1.0)[:, None, None]
+    scaled: NDArray[np.float64] = sign * cofactors / np.where(largest > 0, largest, 1.0)
+    return scaled
 
 
 def _uv_columns(texture: SceneTexture | None) -> NDArray[np.float64]:

@@ -12,6 +12,7 @@ import pytest
 from props import AHEAD, WHITE, shoot
 
 from tyndall.gpu.device import Gpu
+from tyndall.gpu.params import ParameterError
 from tyndall.scene.model import DirectionalLight, Image, Instance, Material, Mesh, Scene, Texture
 from tyndall.techniques.shadow.shadow_map import ShadowMap
 
@@ -225,3 +226,24 @@ def test_bytes_of_a_mesh_are_counted(gpu: Gpu) -> None:
     )
     white_maps = 2 * 4
     assert shot.memory["mesh"] == geometry + dtype_sizes + white_maps
+
+
+def test_a_flat_instance_is_lit_like_a_flat_mesh(gpu: Gpu) -> None:
+    """A box squeezed to no thickness: the normals of its front and back stay, and no matrix needs an inverse."""
+    flat = replace(props.box((-2, -1.5, -1), (2, 1.5, 1)), transform=np.diag([1.0, 1.0, 0.0, 1.0]))
+    matrix = np.array(flat.transform)
+    matrix[2, 3] = -4
+    shot = shoot(gpu, Scene([replace(flat, transform=matrix)], [SUN], AHEAD), SIZE, shadow=ShadowMap(bias=4.0)).base
+    wall = shoot(gpu, Scene([WALL], [SUN], AHEAD), SIZE, shadow=ShadowMap(bias=4.0)).base
+    assert wall.any()
+    np.testing.assert_allclose(shot, wall, rtol=2e-3)
+
+
+def test_normals_of_any_length_give_the_same_light(gpu: Gpu) -> None:
+    long = replace(WALL.mesh, normals=np.array([(0, 0, 2.5)] * 4))
+    shots = [shoot(gpu, Scene([Instance(mesh)], [SUN], AHEAD), SIZE).base for mesh in (WALL.mesh, long)]
+    assert shots[0].any()
+    assert np.array_equal(*shots)
+    for bad in (0.0, math.nan, math.inf):
+        with pytest.raises(ParameterError, match="^normals: a normal is zero or not finite$"):
+            replace(WALL.mesh, normals=np.full((4, 3), bad))

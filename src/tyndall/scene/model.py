@@ -213,12 +213,13 @@ class Mesh:
     Attributes:
         positions: (V, 3) float32, metres.
         indices: (T, 3) uint32, counter-clockwise seen from outside.
-        normals: (V, 3) float32, unit length.
+        normals: (V, 3) float32; made unit length where they are not. None: area-weighted means of the faces around.
         uvs: (V, 2) float32 or None.
         material: how the surface reflects.
 
     Raises:
-        ParameterError: shapes that do not fit, an index out of range, or a position that is not finite.
+        ParameterError: shapes that do not fit, an index out of range, a position that is not finite, or a normal that
+            points nowhere.
     """
 
     positions: NDArray[np.float32]
@@ -251,6 +252,7 @@ class Mesh:
         for name, width in (("normals", 3), ("uvs", 2)):
             if getattr(self, name) is not None and len(array(name, np.float32, width)) != len(positions):
                 raise ParameterError(f"{name}: {len(getattr(self, name))} for {len(positions)} vertices")
+        object.__setattr__(self, "normals", _unit(np.asarray(self.normals)))
 
     @property
     def triangle_count(self) -> int:
@@ -262,8 +264,20 @@ class Mesh:
         return self.positions.min(axis=0), self.positions.max(axis=0)
 
 
+def _unit(normals: NDArray[np.float32]) -> NDArray[np.float32]:
+    """The normals themselves where all have unit length to 1e-3, so that saved ones load bit for bit."""
+    square = np.einsum("ij,ij->i", normals, normals)
+    if np.abs(square - 1).max() < 2e-3:
+        return normals
+    with np.errstate(over="ignore", invalid="ignore"):
+        length = np.linalg.norm(normals.astype(np.float64), axis=1, keepdims=True)
+    if not (np.isfinite(length) & (length > 0)).all():
+        raise ParameterError("normals: a normal is zero or not finite")
+    return (normals / length).astype(np.float32)
+
+
 def vertex_normals(positions: NDArray[np.float32], indices: NDArray[np.uint32]) -> NDArray[np.float32]:
-    """Area-weighted vertex normals, (V, 3) unit float32; +Y where a vertex has no area around it."""
+    """Area-weighted vertex normals, (V, 3) unit float32; +Y where the area around is 0 or beyond float32."""
     a, b, c = (positions[indices[:, i]] for i in range(3))
     face = np.cross(b - a, c - a).astype(np.float64)
     normals = np.stack(
@@ -271,9 +285,8 @@ def vertex_normals(positions: NDArray[np.float32], indices: NDArray[np.uint32]) 
         axis=1,
     )
     length = np.linalg.norm(normals, axis=1, keepdims=True)
-    degenerate = length[:, 0] < 1e-30
-    normals = normals / np.where(length < 1e-30, 1, length)
-    normals[degenerate] = (0, 1, 0)
+    usable = (length >= 1e-30) & (length < np.inf)
+    normals = np.where(usable, normals, (0, 1, 0)) / np.where(usable, length, 1)
     return normals.astype(np.float32)
 
 
