@@ -297,7 +297,7 @@ def test_shafts_agree_with_rays_cast_to_the_light(gpu: Gpu, name: str, near: boo
     """The whole chain, shadow map included, against 250 samples a ray that ask the triangles themselves."""
     scene, expected = cast_shafts(near)
     assert expected.max() > 2 * expected.min()
-    shot = shoot(gpu, scene, volumetric=make(name), shadow=ShadowMap(size=2048))
+    shot = shoot(gpu, scene, volumetric=make(name), shadow=ShadowMap(size=512 if near else 1024))
     assert props.difference(shot.inscattered, expected) < 0.02
 
 
