@@ -181,6 +181,21 @@ def test_a_placed_mesh_is_as_if_its_vertices_were_moved(gpu: Gpu, scale: tuple[f
     np.testing.assert_array_equal(np.isfinite(images[0].depth), np.isfinite(images[1].depth))
 
 
+def test_a_normal_map_on_a_mirrored_mesh(gpu: Gpu) -> None:
+    """Seen from its outside, a mirrored wall's u runs the other way, and the bump leans with it."""
+    tilted = Texture(Image(np.full((2, 2, 4), (218, 128, 218, 255), np.uint8)))
+    mesh = replace(WALL.mesh, material=replace(WHITE, normal_texture=tilted))
+    mirror = Instance(mesh, ((-1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1)))
+    base = shoot(gpu, Scene([mirror], [SUN], AHEAD), SIZE, shadow=ShadowMap(bias=4.0)).base
+    seen = look_up(Scene([WALL]))
+    on = np.isfinite(seen.distance)
+    n = np.array([-(218 / 255 * 2 - 1), -(128 / 255 * 2 - 1), 218 / 255 * 2 - 1])
+    expected = props.surface_light(
+        Scene([WALL], [SUN], AHEAD), SIZE, n / np.linalg.norm(n), np.where(on, seen.distance, 1)
+    )
+    np.testing.assert_allclose(base[on], expected[on], rtol=0.02, atol=0.01)
+
+
 def test_instances_of_one_mesh_are_each_in_their_place(gpu: Gpu) -> None:
     cube = props.box((-0.2, -0.2, -0.2), (0.2, 0.2, 0.2)).mesh
     places = [(x, y, -4.0) for x in (-1, 0, 1) for y in (-0.6, 0.6)]
