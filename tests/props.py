@@ -283,7 +283,7 @@ def arriving(light: Light, sigma: ArrayLike, points: Floats) -> tuple[Floats, Fl
     if isinstance(light, SpotLight):
         # The formula of KHR_lights_punctual.
         axis = np.array(light.direction) / np.linalg.norm(light.direction)
-        scale = 1 / max(0.001, math.cos(light.inner_angle) - math.cos(light.outer_angle))
+        scale = 1 / (math.cos(light.inner_angle) - math.cos(light.outer_angle))
         offset = -math.cos(light.outer_angle) * scale
         irradiance = irradiance * np.clip((way / r) @ axis * scale + offset, 0, 1)[..., None] ** 2
     return irradiance, way / r

@@ -52,6 +52,15 @@ def test_a_lit_wall_is_the_closed_form(gpu: Gpu, light: Light, material: Materia
     np.testing.assert_allclose(shot.base, expected, rtol=0.01, atol=2e-3 * expected.max())
 
 
+@pytest.mark.parametrize("angle", [0.5, 0.05, 0.02, 0.005])
+def test_a_narrow_cone_is_as_bright_on_its_axis_as_a_wide_one(gpu: Gpu, angle: float) -> None:
+    light = SpotLight((0, 0, 0), (0, 0, -1), 25 * math.pi, outer_angle=angle)
+    scene = Scene([props.wall(-5)], [light], replace(AHEAD, fov=0.01))
+    base = shoot(gpu, scene, (3, 3), shadow=ShadowMap(size=256)).base
+    expected = props.surface_light(scene, (3, 3), (0, 0, 1), 5 * props.rays(scene.camera, (3, 3)).stretch)
+    np.testing.assert_allclose(base[1, 1], expected[1, 1], rtol=0.01)
+
+
 def test_a_point_light_in_the_air_is_dimmed_on_its_way(gpu: Gpu) -> None:
     medium = Medium((0.1, 0.2, 0.3), 0.05)
     scene = Scene([props.wall(-5)], [PointLight((0, 0, -1.0), 9.0)], AHEAD, medium)
