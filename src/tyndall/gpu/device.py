@@ -505,6 +505,7 @@ class Gpu:
         """
         labels = self._submitted_labels
         if not labels:
+            self.wait()
             return []
         self._readback.map_sync(wgpu.MapMode.READ, 0, 16 * len(labels))
         raw = np.frombuffer(self._readback.read_mapped(0, 16 * len(labels)), np.uint64).astype(np.float64)

@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tyndall.gpu.device import Gpu
+from tyndall.gpu.device import Gpu, GpuError
 from tyndall.gpu.params import replace
 from tyndall.lab import bench_tables, metrics
 from tyndall.lab.compare import check_folder
@@ -144,7 +144,7 @@ def volumetric(
         progress: hears a fraction of 1 and what is being measured.
 
     Raises:
-        GpuError: no such adapter, or one that cannot draw at these settings.
+        GpuError: no such adapter, or one that cannot draw at these settings, or not time what it draws.
         OutputError: ``out`` cannot be written.
     """
     if out is not None:
@@ -328,10 +328,13 @@ class _Run:
 
 
 def _figures(measured: Measurement) -> dict[str, Any]:
+    technique, shadow, frame = measured.technique("volumetric"), measured.technique("shadow"), measured.frame
+    if technique is None or shadow is None or frame is None:
+        raise GpuError("this adapter cannot time what it draws (timestamp-query), and a benchmark is of times")
     return {
-        "gpu_ms": measured.technique("volumetric").to_json(),
-        "frame_ms": measured.frame.to_json(),
-        "shadow_ms": measured.technique("shadow").to_json(),
+        "gpu_ms": technique.to_json(),
+        "frame_ms": frame.to_json(),
+        "shadow_ms": shadow.to_json(),
         "host_ms": measured.host.to_json(),
         "passes": {name: round(times.median, 6) for name, times in measured.passes.items()},
         "memory_bytes": measured.bytes_of("volumetric"),

@@ -21,6 +21,7 @@ import math
 import os
 import shutil
 import tempfile
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from io import StringIO
@@ -76,6 +77,8 @@ class Result:
     """One technique's part of a comparison.
 
     Attributes:
+        label: unique in a comparison, and the name of its files: the technique, "-paper" where its model is the
+            paper's, and a number where several would be called the same.
         technique: its name.
         model: "physical" or "paper"; None for a technique that has one model only.
         parameters: all of its parameters.
@@ -86,6 +89,7 @@ class Result:
         error_map: (H, W) relative error of ``L_v`` (:func:`tyndall.lab.metrics.error_map`); None without a reference.
     """
 
+    label: str
     technique: str
     model: str | None
     parameters: Mapping[str, Any]
@@ -96,22 +100,18 @@ class Result:
     error_map: NDArray[np.float32] | None
 
     @property
-    def label(self) -> str:
-        """Unique in a comparison, and the name of its files: the technique, and its model where that is the paper's."""
-        return f"{self.technique}-paper" if self.model == "paper" else self.technique
-
-    @property
     def memory_bytes(self) -> int:
         """Bytes that the technique itself holds on the device."""
         return self.measurement.bytes_of("volumetric")
 
     def to_json(self, image: str | None) -> dict[str, Any]:
-        """The entry of ``results``; ``image`` is where its picture was saved."""
+        """The entry of ``results``; ``image`` is where its picture was saved. Times are null without a GPU timer."""
+        technique, frame = self.measurement.technique("volumetric"), self.measurement.frame
         return {
             "technique": self.technique,
             "model": self.model,
-            "gpu_ms": self.measurement.technique("volumetric").to_json(),
-            "frame_ms": round(self.measurement.frame.median, 6),
+            "gpu_ms": technique.to_json() if technique else None,
+            "frame_ms": round(frame.median, 6) if frame else None,
             "memory_bytes": self.memory_bytes,
             "error": self.error.to_json() if self.error else None,
             "image": image,
@@ -170,8 +170,12 @@ class Comparison:
             technique, frame = result.measurement.technique("volumetric"), result.measurement.frame
             error = result.error
             table.add_row(
-                result.technique + ("*" if result.model == "paper" else ""),
-                *(_milliseconds(ms) for t in (technique, frame) for ms in (t.median, t.min, t.p95)),
+                result.label.replace("-paper", "*"),
+                *(
+                    _milliseconds(ms)
+                    for t in (technique, frame)
+                    for ms in ((t.median, t.min, t.p95) if t else 3 * [None])
+                ),
                 f"{result.memory_bytes / 2**20:.2f}",
                 *(_scores(error) if error else "–––"),
             )
@@ -191,6 +195,8 @@ class Comparison:
             state = "converged" if truth.within else "NOT converged"
             change = f"doubling changes L_v by {_percent(truth.change)}"
             notes.append(f"reference: {truth.technique}, {truth.steps} steps, {state} ({change})")
+        if any(not result.measurement.passes for result in self.results):
+            notes.append("this adapter cannot time what it draws (timestamp-query)")
         if any(result.model == "paper" for result in self.results):
             notes.append("* the paper's own units, held against the same physical reference")
         notes += [f"{name}: {reason}" for name, reason in self.skipped.items()]
@@ -283,7 +289,7 @@ def compare(
     scene: Scene,
     *,
     size: tuple[int, int] = (1280, 720),
-    volumetric: Sequence[str | Technique] | None = None,
+    volumetric: str | Technique | Sequence[str | Technique] | None = None,
     shadow: str | Technique | None = None,
     antialiasing: str | Technique | None = None,
     tonemap: str | Technique | None = None,
@@ -301,7 +307,8 @@ def compare(
 
     Args:
         size: width and height in pixels.
-        volumetric: techniques by name or ready made; None is all of them, less those that refuse the scene's lights.
+        volumetric: one or more techniques, by name or ready made; None is all of them, less those that
+            refuse the scene's lights.
         shadow, antialiasing, tonemap: by name or ready made; None is the family's default.
         model: "physical", "paper" or "both", for the techniques that have models; None leaves each as it is.
         parameters: by technique name, parameters to change: ``{"froxel": {"grid": (190, 90, 128)}}``.
@@ -333,10 +340,10 @@ def compare(
             truth = find(stage, reference, progress=tell.inside)
             portrait = _portrait(stage, truth)
         results, skipped = [], {}
-        for technique in techniques:
+        for label, technique in zip(_labels(techniques), techniques, strict=True):
             tell.begin(technique.name)
             try:
-                results.append(_one(stage, technique, truth, frames, warmup, tell))
+                results.append(_one(stage, label, technique, truth, frames, warmup, tell))
             except Unsupported as error:
                 if volumetric is not None:
                     raise
@@ -366,7 +373,10 @@ def compare(
 
 
 def choose(
-    scene: Scene, volumetric: Sequence[str | Technique] | None, model: str | None, parameters: Overrides | None
+    scene: Scene,
+    volumetric: str | Technique | Sequence[str | Technique] | None,
+    model: str | None,
+    parameters: Overrides | None,
 ) -> list[Technique]:
     """The volumetric techniques of a comparison, ready made.
 
@@ -375,6 +385,8 @@ def choose(
     """
     if model not in (None, "physical", "paper", "both"):
         raise ParameterError(f"model: '{model}' is not one of 'physical', 'paper', 'both'")
+    if isinstance(volumetric, (str, Technique)):
+        volumetric = [volumetric]
     wanted = FAMILIES["volumetric"].members if volumetric is None else volumetric
     chosen = []
     for item in wanted:
@@ -427,8 +439,24 @@ def _portrait(stage: Stage, truth: Reference, seconds: float = 8.0) -> Picture:
     return stage.picture(truth.technique)
 
 
+def _labels(techniques: Sequence[Technique]) -> list[str]:
+    labels: list[str] = []
+    counts: Counter[str] = Counter()
+    for technique in techniques:
+        label = technique.name + ("-paper" if getattr(technique, "model", None) == "paper" else "")
+        counts[label] += 1
+        labels.append(label if counts[label] == 1 else f"{label}-{counts[label]}")
+    return labels
+
+
 def _one(
-    stage: Stage, technique: Technique, truth: Reference | None, frames: int | None, warmup: int | None, tell: _Telling
+    stage: Stage,
+    label: str,
+    technique: Technique,
+    truth: Reference | None,
+    frames: int | None,
+    warmup: int | None,
+    tell: _Telling,
 ) -> Result:
     measurement = measure(
         stage.use(technique),
@@ -449,6 +477,7 @@ def _one(
         if rel_rmse is not None and bias is not None:
             error = Error(rel_rmse, bias, metrics.psnr(still.picture.pixels, reference.picture.pixels))
     return Result(
+        label=label,
         technique=technique.name,
         model=getattr(technique, "model", None),
         parameters=describe(technique),
@@ -460,8 +489,10 @@ def _one(
     )
 
 
-def _milliseconds(ms: float) -> str:
-    """Three significant digits, which is what a timer gives."""
+def _milliseconds(ms: float | None) -> str:
+    """Three significant digits, which is what a timer gives; a dash where there is no timer."""
+    if ms is None:
+        return "–"
     return f"{ms:.3f}" if ms < 1 else f"{ms:.2f}" if ms < 10 else f"{ms:.1f}" if ms < 100 else f"{ms:.0f}"
 
 

@@ -3,24 +3,28 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
 
-from tyndall.gpu.device import Gpu
+from tyndall.gpu.device import Gpu, GpuError
 from tyndall.gpu.params import ParameterError
 from tyndall.lab import stage
+from tyndall.lab.bench import QUICK, volumetric
 from tyndall.lab.compare import Comparison, compare
 from tyndall.lab.fingerprint import scene_hash
 from tyndall.lab.picture import OutputError
 from tyndall.lab.render import render
 from tyndall.scene.bundled.box import box
 from tyndall.scene.model import Medium, Scene
+from tyndall.techniques.volumetric import Froxel
 
 SIZE = (64, 36)
-SMALL = {"froxel": {"grid": (32, 18, 32)}, "shadow_map": {"size": 256}}
+SHADOW = {"shadow_map": {"size": 256}}
+SMALL = {**SHADOW, "froxel": {"grid": (32, 18, 32)}}
 
 
 @pytest.fixture(scope="module")
@@ -161,6 +165,8 @@ def test_notebooks_get_table_and_pictures(comparison: Comparison) -> None:
         ({"warmup": -1}, "warmup: -1"),
         ({"volumetric": ["off"], "reference": "off"}, "no number of steps"),
         ({"shadow": "nope"}, "shadow technique 'nope'"),
+        ({"volumetric": [Froxel]}, "Froxel'> is neither a volumetric technique nor the name of one"),
+        ({"parameters": {"froxle": {"grid": (8, 8, 8)}}}, "parameters: no technique 'froxle' — did you mean 'froxel'?"),
     ],
 )
 def test_mistakes_get_one_line(gpu: Gpu, scene: Scene, arguments: dict[str, object], message: str) -> None:
@@ -168,6 +174,31 @@ def test_mistakes_get_one_line(gpu: Gpu, scene: Scene, arguments: dict[str, obje
         compare(scene, size=SIZE, adapter=gpu, **arguments)  # type: ignore[arg-type]
     assert message in str(error.value)
     assert "\n" not in str(error.value)
+
+
+def test_one_technique_twice_has_two_rows_and_files(gpu: Gpu, scene: Scene, tmp_path: Path) -> None:
+    twice = [Froxel(grid=(n, n, n)) for n in (4, 8)]
+    options = {"size": (16, 9), "reference": None, "frames": 1, "warmup": 0, "adapter": gpu, "parameters": SHADOW}
+    found = compare(scene, volumetric=twice, out=tmp_path, **options)  # type: ignore[arg-type]
+    assert [result.label for result in found.results] == ["froxel", "froxel-2"]
+    assert {path.name for path in tmp_path.glob("*.png")} == {"froxel.png", "froxel-2.png"}
+    assert found.to_json()["parameters"]["volumetric"]["froxel-2"]["grid"] == (8, 8, 8)
+    alone = compare(scene, volumetric="off", **options)  # type: ignore[arg-type]
+    assert [result.technique for result in alone.results] == ["off"]
+
+
+def test_an_adapter_without_timers_gives_no_times(gpu: Gpu, scene: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(gpu, "_timed", False)
+    found = compare(
+        scene, size=(16, 9), volumetric=["froxel"], reference=None, frames=1, warmup=0, adapter=gpu, parameters=SMALL
+    )
+    (result,) = found.to_json()["results"]
+    assert result["gpu_ms"] is None
+    assert result["frame_ms"] is None
+    assert result["memory_bytes"] > 0
+    assert "timestamp-query" in str(found)
+    with pytest.raises(GpuError, match="cannot time what it draws"):
+        volumetric(gpu, settings=replace(QUICK, size=(16, 9), shadow_size=64))
 
 
 def test_a_vacuum_has_no_relative_error(gpu: Gpu, scene: Scene) -> None:

@@ -7,7 +7,7 @@ caches and bring the device to its clock.
 
 A technique's time is the sum of its own passes, named ``family.technique`` and ``family.technique.step``; its memory is
 what its owner of that name holds. The median is the figure to quote; the minimum is the least disturbed frame, and the
-95th percentile shows how steady it was.
+95th percentile shows how steady it was. An adapter without timestamp queries gives no GPU times: None, not zero.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class Measurement:
     """What :func:`measure` found.
 
     Attributes:
-        passes: GPU milliseconds of each pass, and of the whole frame under "frame".
+        passes: GPU milliseconds of each pass, and of the whole frame under "frame"; empty without timestamp queries.
         families: GPU milliseconds of each family's or content's passes together ("volumetric", "shadow", "mesh", …).
         host: host milliseconds to encode and submit a frame.
         memory: bytes on the device by owner.
@@ -70,13 +70,13 @@ class Measurement:
     frames: int
 
     @property
-    def frame(self) -> Times:
-        """GPU milliseconds of the whole frame."""
-        return self.passes["frame"]
+    def frame(self) -> Times | None:
+        """GPU milliseconds of the whole frame; None without timestamp queries."""
+        return self.passes.get("frame")
 
-    def technique(self, family: str) -> Times:
-        """GPU milliseconds of a family's passes; zeros where it draws none, as ``off`` does."""
-        return self.families.get(family, Times(0.0, 0.0, 0.0))
+    def technique(self, family: str) -> Times | None:
+        """GPU milliseconds of a family's passes; zeros where it draws none, None without timestamp queries."""
+        return self.families.get(family, Times(0.0, 0.0, 0.0)) if self.passes else None
 
     def bytes_of(self, family: str) -> int:
         """Bytes that a family's technique holds."""

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from tyndall.frame import Renderer
 from tyndall.gpu.device import Gpu
-from tyndall.gpu.params import fields_of
+from tyndall.gpu.params import ParameterError, fields_of, nearest
 from tyndall.lab.picture import Picture
 from tyndall.scene.model import Scene
 from tyndall.techniques import FAMILIES
@@ -89,6 +89,10 @@ class Stage:
         adapter: str | Gpu | None = None,
         seed: int = 0,
     ) -> None:
+        known = [name for family in FAMILIES.values() for name in family.members]
+        for name in parameters or {}:
+            if name not in known:
+                raise ParameterError(f"parameters: no technique '{name}'{nearest(name, known)}")
         self.scene, self.size, self.seed = scene, size, seed
         self.shadow = make("shadow", shadow, scene, parameters)
         self.antialiasing = make("antialiasing", antialiasing, scene, parameters)

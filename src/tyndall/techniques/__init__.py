@@ -49,12 +49,14 @@ class Family:
             changes: parameters by name, values as texts or of their type.
 
         Raises:
-            ParameterError: an unknown name, or a value outside its range.
+            ParameterError: an unknown name, what is no technique, or a value outside its range.
         """
         if isinstance(technique, Technique):
             if type(technique) not in self.members.values():
                 raise ParameterError(f"{technique.name} is not a {self.name} technique")
             made = technique
+        elif technique is not None and not isinstance(technique, str):
+            raise ParameterError(f"{technique!r} is neither a {self.name} technique nor the name of one")
         else:
             cls = self.find(technique or self.default)
             made = replace(cls(), (looks or {}).get(cls.name, {}))
