@@ -10,8 +10,8 @@ is added to an unattenuated base image.
 
 ``model="physical"`` scatters in the scene's medium: the mean visibility ``V̄ = Σ decay^i·V / Σ decay^i`` multiplies
 the airlight of the unshadowed ray, ``σs·p·E·(1 − e^(−σt·d))/σt`` for a directional light, and its quadrature for a
-point or spot light; the base image is attenuated. A sample outside the picture says nothing and is left out of the
-mean; where all are, V̄ = 0. For point and spot lights a sample sees the light if what it shows lies farther than the
+point or spot light; the base image is attenuated. Towards a light outside the picture the samples end at its edge: what
+lies beyond says nothing. For point and spot lights a sample sees the light if what it shows lies farther than the
 light.
 
 A light behind the camera has no place on the screen: it makes no shafts (S1's formula would mirror it).
