@@ -30,6 +30,7 @@ from typing import Any, Literal, Union, cast, get_args, get_origin, get_type_hin
 import numpy as np
 
 _KEY = "tyndall.param"
+_LARGEST = 1e30  # a float32 holds it, and its product with another of a device's numbers of usual size
 
 
 def _cached[F: Callable[..., Any]](function: F) -> F:
@@ -120,7 +121,7 @@ def convert(f: Field, value: Any) -> Any:
     """``value`` as the type that ``f`` declares, inside its range.
 
     Raises:
-        ParameterError: it cannot be converted, is not finite, or is outside the range.
+        ParameterError: it cannot be converted, is not finite or beyond ±1e30, or is outside the range.
     """
     try:
         result = _as_type(f.type, value)
@@ -129,6 +130,8 @@ def convert(f: Field, value: Any) -> Any:
     for component in _numbers(result):
         if not math.isfinite(component):
             raise ParameterError(f"{f.name}: {component} is not a finite number")
+        if abs(component) > _LARGEST:
+            raise ParameterError(f"{f.name}: {component:g} is beyond {_LARGEST:g}")
         if (f.param.low is not None and component < f.param.low) or (
             f.param.high is not None and component > f.param.high
         ):

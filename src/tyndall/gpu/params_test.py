@@ -100,6 +100,7 @@ def test_a_shader_reads_every_field(gpu: Gpu) -> None:
         ({"limit": "none"}, None),
         ({"limit": -1}, "limit: -1 is outside ≥ 0"),
         ({"limit": math.inf}, "limit: inf is not a finite number"),
+        ({"limit": 1e39}, "limit: 1e+39 is beyond 1e+30"),
         ({"coun": 3}, "coun: no such parameter — did you mean 'count'?"),
         ({"zzz": 3}, "zzz: no such parameter"),
     ],

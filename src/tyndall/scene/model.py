@@ -13,7 +13,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -330,20 +330,29 @@ class Scene:
 
     ``looks`` holds, by technique name, the parameters that suit this scene (``{"froxel": {"z_limit": 17.6}}``); a
     technique made for the scene starts from them.
+
+    Raises:
+        ParameterError: an instance or light that is none, a colour that is negative or not finite.
     """
 
     instances: tuple[Instance, ...] = ()
     lights: tuple[Light, ...] = ()
     camera: Camera = Camera()
     medium: Medium = Medium()
-    background: Vec3 = (0.0, 0.0, 0.0)
-    ambient: Vec3 = (0.0, 0.0, 0.0)
+    background: Vec3 = param((0.0, 0.0, 0.0), 0, None, "linear radiance where no surface is")
+    ambient: Vec3 = param((0.0, 0.0, 0.0), 0, None, "linear radiance that arrives from everywhere")
     looks: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     name: str = "scene"
 
     def __post_init__(self) -> None:
+        check(self)
         object.__setattr__(self, "instances", tuple(self.instances))
         object.__setattr__(self, "lights", tuple(self.lights))
+        for name, kinds in (("instances", (Instance,)), ("lights", get_args(Light))):
+            for index, item in enumerate(getattr(self, name)):
+                if not isinstance(item, kinds):
+                    expected = " or ".join(kind.__name__ for kind in kinds)
+                    raise ParameterError(f"{name}[{index}]: {type(item).__name__} is not {expected}")
 
     @property
     def triangle_count(self) -> int:

@@ -27,7 +27,7 @@ from pydantic_core import PydanticCustomError
 from tyndall.gpu.params import Field, Param, ParameterError, convert, describe_type, fields_of, nearest
 from tyndall.scene.files.scene_json import VERSION
 from tyndall.scene.files.source import shorten
-from tyndall.scene.model import Camera, Image, Light, Mat4, Material, Medium, Texture, Vec3
+from tyndall.scene.model import Camera, Image, Light, Mat4, Material, Medium, Scene, Texture
 
 # The lists of the file that hold what another record refers to by index.
 _TABLES = {Image: "images", Texture: "textures", Material: "materials"}
@@ -82,6 +82,12 @@ def _annotation(f: Field, tp: Any) -> Any:
 
 def _unit(p: Param) -> dict[str, Any] | None:
     return {"unit": p.unit} if p.unit else None
+
+
+def declared(cls: type, name: str) -> Any:
+    """The annotation of one declared field of ``cls``, its default and meaning with it."""
+    (f,) = (f for f in fields_of(cls) if f.name == name)
+    return Annotated[_annotation(f, f.type), pydantic.Field(default=f.default, description=f.param.doc)]
 
 
 @cache
@@ -239,8 +245,8 @@ class SceneRecord(Record):
     camera: parameters(Camera) = Camera()  # type: ignore[valid-type]
     lights: tuple[one_of(get_args(Light)), ...] = ()  # type: ignore[valid-type]
     medium: parameters(Medium) = Medium()  # type: ignore[valid-type]
-    background: Vec3 = pydantic.Field((0.0, 0.0, 0.0), description="linear radiance where no surface is")
-    ambient: Vec3 = pydantic.Field((0.0, 0.0, 0.0), description="linear radiance that arrives from everywhere")
+    background: declared(Scene, "background")  # type: ignore[valid-type]
+    ambient: declared(Scene, "ambient")  # type: ignore[valid-type]
     looks: dict[str, dict[str, Any]] = pydantic.Field({}, description="parameters of techniques, by technique name")
     data: str | None = pydantic.Field(None, description="the binary file with geometry and texels, beside this file")
     images: tuple[ImageRecord, ...] = ()
