@@ -174,3 +174,12 @@ def test_two_runs_are_bit_identical(gpu: Gpu) -> None:
                 taa.draw()
             images.append(taa.radiance())
     assert np.array_equal(*images)
+
+
+def test_the_brightest_light_stays_as_bright(gpu: Gpu) -> None:
+    """The sun itself, in a picture that is kept as .exr: half a float goes up to 65504."""
+    bright = Material("bright", (1, 1, 1, 1), emissive=(60_000, 30_000, 10))
+    with renderer(gpu, Scene([props.wall(-4, material=bright)], [], AHEAD), Taa()) as made:
+        for _ in range(4):
+            made.draw()
+        np.testing.assert_allclose(made.radiance()[5, 5], [60_000, 30_000, 10], rtol=0.02)
