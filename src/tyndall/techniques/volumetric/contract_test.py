@@ -352,6 +352,24 @@ def test_near_lights_against_quadrature(gpu: Gpu, name: str, light: PointLight |
     assert error.max() < 0.02
 
 
+@pytest.mark.parametrize("light", NEAR_LIGHTS[:3])
+@pytest.mark.parametrize("name", LIT)
+def test_near_lights_in_endless_air(gpu: Gpu, name: str, light: PointLight | SpotLight) -> None:
+    """Rays to the sky end after no distance that a grid or a number of steps could be made for."""
+    scene = Scene([], [light], AHEAD, AIR)
+    try:
+        shot = shoot(gpu, scene, volumetric=make(name))
+    except Unsupported:
+        return
+    spans = [(0, 8), (8, 30), (30, 120), (120, 400)]
+    expected = np.sum([props.quadrature(scene, light, TINY, a, b) for a, b in spans], axis=0)
+    closest = np.linalg.norm(np.cross(props.rays(AHEAD, TINY).directions, np.array(light.position)), axis=-1)
+    clear = closest > 0.4
+    error = np.abs(shot.inscattered - expected)[clear] / expected.max(axis=(0, 1), where=clear[..., None], initial=0)
+    assert error.max() < 0.01
+    assert shot.inscattered.mean() == pytest.approx(expected.mean(), rel=0.01)
+
+
 @pytest.mark.parametrize("name", LIT)
 def test_near_lights_fall_with_the_square_of_the_distance(gpu: Gpu, name: str) -> None:
     """In air too thin to dim, twice as far is a quarter of the light."""
