@@ -10,9 +10,10 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import time
-from collections import defaultdict
+from collections import Counter, defaultdict
 from types import TracebackType
 from typing import Any, Self
 
@@ -297,8 +298,14 @@ class Renderer:
         return dict(sums)
 
     def memory(self) -> dict[str, int]:
-        """Bytes on the device by owner: "frame", "mesh", "shadow.shadow_map", "volumetric.froxel" …"""
-        return self.gpu.ledger.by_owner()
+        """Bytes that this renderer holds on the device, by owner: "frame", "mesh", "shadow.shadow_map",
+        "volumetric.froxel" … Others on the same device do not count; ``gpu.ledger`` has everything.
+        """
+        totals: Counter[str] = Counter()
+        held = [content.resources() for content in self._content] + [view.resources() for view in self._views.values()]
+        for resource in itertools.chain(self._resources, *held):
+            totals[resource.owner] += resource.size_bytes
+        return dict(totals)
 
     def close(self) -> None:
         """Free everything this renderer made."""

@@ -213,6 +213,25 @@ def test_a_renderer_that_cannot_be_made_leaves_nothing_behind(gpu: Gpu, monkeypa
             assert gpu.ledger.total == before, refused
 
 
+def test_memory_is_the_renderers_own(gpu: Gpu) -> None:
+    """Two renderers share a device: neither counts the other's bytes, and together they are the ledger's."""
+    scene = Scene([props.wall(-4)], [DirectionalLight((0, 0, -1))], AHEAD, Medium(0.1))
+    other = gpu.ledger.by_owner()
+    other.pop("constants", None)
+    with Renderer(scene, TINY, gpu=gpu, shadow=ShadowMap(size=64)) as one:
+        one.draw()
+        alone = one.memory()
+        assert alone.keys() == {
+            *("frame", "mesh", "shadow.shadow_map", "volumetric.froxel", "antialiasing.taa", "tonemap.aces")
+        }
+        with Renderer(scene, (8, 8), gpu=gpu, shadow=ShadowMap(size=64)) as two:
+            two.draw()
+            assert one.memory() == alone
+            both = gpu.ledger.by_owner()
+            both.pop("constants")
+            assert sum(both.values()) == sum(r for m in (other, alone, two.memory()) for r in m.values())
+
+
 @pytest.mark.parametrize("seed", [-1, 2**32])
 def test_a_seed_has_32_bits(gpu: Gpu, seed: int) -> None:
     with pytest.raises(ParameterError, match=f"^seed: {seed} is outside 0 … 4294967295$"):

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tyndall.gpu.device import Blend, Gpu, Raster
-from tyndall.gpu.resources import Bound, Buffer, Texture
+from tyndall.gpu.resources import Bound, Buffer, Resource, Texture
 from tyndall.scene.model import Material, Mesh, Scene
 from tyndall.scene.model import Texture as SceneTexture
 
@@ -231,6 +231,10 @@ class Meshes:
             )
         return bundle.finish()
 
+    def resources(self) -> list[Resource]:
+        """What the meshes hold on the device."""
+        return [*self._buffers, *self._textures.values()]
+
     def forget_bundles(self) -> None:
         """Drop what was recorded, so that destroyed resources are not kept alive by it."""
         self._bundles.clear()
@@ -238,7 +242,7 @@ class Meshes:
     def close(self) -> None:
         """Free all device memory."""
         self.forget_bundles()
-        for resource in (*self._buffers, *self._textures.values()):
+        for resource in self.resources():
             resource.destroy()
         self._buffers.clear()
         self._textures.clear()

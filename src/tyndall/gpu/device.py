@@ -508,8 +508,10 @@ class Gpu:
             self.wait()
             return []
         self._readback.map_sync(wgpu.MapMode.READ, 0, 16 * len(labels))
-        raw = np.frombuffer(self._readback.read_mapped(0, 16 * len(labels)), np.uint64).astype(np.float64)
-        self._readback.unmap()
+        try:
+            raw = np.frombuffer(self._readback.read_mapped(0, 16 * len(labels)), np.uint64).astype(np.float64)
+        finally:
+            self._readback.unmap()
         stamps = raw.reshape(-1, 2) * self._period * 1e-6
         if self.adapter_info["adapter_type"] == "CPU":
             # Mesa's software adapter runs passes one after another, but may stamp a pass's beginning only when its

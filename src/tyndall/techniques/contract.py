@@ -118,14 +118,16 @@ class View:
         made = self.gpu.compute(f"{self.owner}.{entry}", module or self.technique.shader(), entry)
         return made.bind(self.scope, params=self.params).overlay(self.overlay)
 
+    def resources(self) -> list[Resource]:
+        """What the technique holds on the device."""
+        return [*self._resources.values(), *([self._params] if self._params else [])]
+
     def close(self) -> None:
         """Free the technique's textures and uniforms."""
-        for resource in self._resources.values():
+        for resource in self.resources():
             resource.destroy()
         self._resources.clear()
-        if self._params is not None:
-            self._params.destroy()
-            self._params = None
+        self._params = None
 
 
 @dataclass(frozen=True)
