@@ -44,15 +44,7 @@ from tyndall.gpu.shader import Linked, Linker, create_module
 
 log = logging.getLogger("tyndall")
 
-_FEATURES = (
-    "timestamp-query",
-    "float32-blendable",
-    "indirect-first-instance",
-    "depth32float-stencil8",
-    "depth-clip-control",
-    "shader-f16",
-    "subgroup",
-)
+_FEATURES = ("timestamp-query", "float32-blendable")
 _LIMITS = (
     "max-texture-dimension-2d",
     "max-texture-dimension-3d",
@@ -84,10 +76,15 @@ def adapters() -> list[wgpu.GPUAdapter]:
 
     OpenGL is left out: it has no float targets and too few storage bindings for the frame.
     """
-    if sys.platform == "linux":
-        # Where there is no desktop session the loader complains on stderr about the missing variable.
-        os.environ.setdefault("XDG_RUNTIME_DIR", tempfile.gettempdir())
-    found = [a for a in wgpu.gpu.enumerate_adapters_sync() if a.info["backend_type"] in _BACKENDS]
+    # Where there is no desktop session the loader complains on stderr about the missing variable.
+    lacking = sys.platform == "linux" and "XDG_RUNTIME_DIR" not in os.environ
+    if lacking:
+        os.environ["XDG_RUNTIME_DIR"] = tempfile.gettempdir()
+    try:
+        found = [a for a in wgpu.gpu.enumerate_adapters_sync() if a.info["backend_type"] in _BACKENDS]
+    finally:
+        if lacking:
+            del os.environ["XDG_RUNTIME_DIR"]  # other libraries of the process would take it for a desktop's
     return sorted(found, key=lambda a: _RANK_TYPE.get(a.info["adapter_type"], 3))
 
 
@@ -196,8 +193,15 @@ class Gpu:
             self._queries = self.device.create_query_set(type="timestamp", count=2 * _MAX_TIMED_PASSES)
             usage = wgpu.BufferUsage
             size = 16 * _MAX_TIMED_PASSES
-            self._resolved = self.device.create_buffer(size=size, usage=usage.QUERY_RESOLVE | usage.COPY_SRC)
-            self._readback = self.device.create_buffer(size=size, usage=usage.COPY_DST | usage.MAP_READ)
+            made = (
+                self.device.create_buffer(label=f"timers.{label}", size=size, usage=bits)
+                for label, bits in (
+                    ("resolved", usage.QUERY_RESOLVE | usage.COPY_SRC),
+                    ("readback", usage.COPY_DST | usage.MAP_READ),
+                )
+            )
+            self._timers = [Resource(self.ledger, "timers", native.label, size, native) for native in made]
+            self._resolved, self._readback = (timer.native for timer in self._timers)
             self._period = _timestamp_period(self.device)
         self._submitted_labels: list[str] = []
 
@@ -609,8 +613,9 @@ class Gpu:
         self._programs.clear()
         self._samplers.clear()
         if self._timed:
-            self._readback.destroy()
-            self._resolved.destroy()
+            self._queries.destroy()
+            for timer in self._timers:
+                timer.destroy()
             self._timed = False
         self.device.destroy()
 

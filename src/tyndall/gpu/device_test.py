@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ import props
 import pytest
 
 from tyndall.frame import Renderer
-from tyndall.gpu.device import Gpu, GpuError, choose_adapter
+from tyndall.gpu.device import Gpu, GpuError, adapters, choose_adapter
 from tyndall.gpu.resources import BYTES_PER_TEXEL, texel_dtype
 from tyndall.scene.model import DirectionalLight, Medium, PointLight, Scene
 from tyndall.techniques import FAMILIES
@@ -174,7 +175,8 @@ def test_nothing_is_left_when_renderers_and_device_close() -> None:
                 renderer.use("volumetric", FAMILIES["volumetric"].make(name, changes=small.get(name)))
                 renderer.draw()
             assert {"frame", "mesh", "shadow.shadow_map"} <= renderer.memory().keys()
-        assert gpu.ledger.by_owner().keys() <= {"constants"}, "constants live as long as the device"
+        assert gpu.ledger.by_owner().keys() <= {"constants", "timers"}, "these live as long as the device"
+        assert (gpu.ledger.by_owner().get("timers", 0) > 0) == ("timestamp-query" in gpu.features)
     assert list(gpu.ledger) == []
     assert gpu.ledger.total == 0
 
@@ -199,3 +201,10 @@ def test_a_failed_pass_does_not_poison_the_next(gpu: Gpu) -> None:
         with pytest.raises(RuntimeError, match="broken"):
             renderer.draw()
     assert props.shoot(gpu, LIT_WALL).base.max() > 0.1
+
+
+def test_listing_adapters_leaves_the_environment_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("XDG_RUNTIME_DIR", raising=False)
+    before = dict(os.environ)
+    assert adapters()
+    assert dict(os.environ) == before
