@@ -369,6 +369,7 @@ def pack_camera(camera: Camera, scene: Scene, size: tuple[int, int], dtype: np.d
     row["ambient"], row["background"] = scene.ambient, scene.background
     row["size"] = size
     row["start"], row["reach"] = depth_range(camera, scene)
+    row["power"] = lights_power(scene, float(row["reach"] - row["start"])) or 1.0
     return row
 
 
@@ -384,9 +385,33 @@ def shifted(row: Any, shift: tuple[float, float]) -> Any:
     return moved
 
 
+def lights_power(scene: Scene, depth: float) -> float:
+    """Sum of the lights' illuminances in lux; of a near one at the nearest air, or ``depth`` away where it is in it.
+
+    A scale for what is kept in half floats, and no more exact than that.
+    """
+    low, high = air_box(scene)
+    total = 0.0
+    for light in scene.lights:
+        area = 1.0
+        if not isinstance(light, DirectionalLight):
+            outside = np.maximum(0, np.maximum(low - light.position, light.position - high))
+            area = max(float(outside @ outside), depth**2)
+        total += max(light.color) * light.intensity / area
+    return total
+
+
+def air_box(scene: Scene) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Lower and upper corner of the medium, or of the scene where the medium is everywhere."""
+    if scene.medium.bounds is None:
+        return scene.bounds
+    low, high = scene.medium.bounds
+    return np.array(low), np.array(high)
+
+
 def depth_range(camera: Camera, scene: Scene) -> tuple[float, float]:
     """View depths between which the medium lies: its box, or from the camera to the scene's far side."""
-    low, high = scene.bounds if scene.medium.bounds is None else map(np.asarray, scene.medium.bounds)
+    low, high = air_box(scene)
     corners = np.array([[(low, high)[(i >> axis) & 1][axis] for axis in range(3)] for i in range(8)])
     depth = (corners - np.asarray(camera.position)) @ -view_matrix(camera)[2, :3]
     start = 0.0 if scene.medium.bounds is None else max(0.0, float(depth.min()))
