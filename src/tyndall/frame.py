@@ -76,7 +76,8 @@ class Renderer:
 
     Raises:
         GpuError: no adapter, or a size beyond its limits.
-        ParameterError: an unknown technique, or a seed that is not of 32 bits.
+        ParameterError: a size that is not in whole pixels, an unknown technique, or a seed that is not of 32
+            bits.
         Unsupported: the technique cannot draw this scene.
     """
 
@@ -93,6 +94,8 @@ class Renderer:
         tonemap: str | Technique | None = None,
         seed: int = 0,
     ) -> None:
+        if not all(isinstance(side, (int, np.integer)) for side in size):
+            raise ParameterError(f"size: {size!r} is not a width and a height in whole pixels")
         if min(size) < 1:
             raise GpuError(f"size: {size[0]}×{size[1]} is not a picture")
         if not 0 <= seed < 2**32:

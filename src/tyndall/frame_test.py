@@ -232,6 +232,12 @@ def test_memory_is_the_renderers_own(gpu: Gpu) -> None:
             assert sum(both.values()) == sum(r for m in (other, alone, two.memory()) for r in m.values())
 
 
+@pytest.mark.parametrize("size", [(16.0, 12.0), "16x12"])
+def test_a_size_is_in_whole_pixels(gpu: Gpu, size: Any) -> None:
+    with pytest.raises(ParameterError, match="^size: .* is not a width and a height in whole pixels$"):
+        Renderer(Scene(), size, gpu=gpu)
+
+
 @pytest.mark.parametrize("seed", [-1, 2**32])
 def test_a_seed_has_32_bits(gpu: Gpu, seed: int) -> None:
     with pytest.raises(ParameterError, match=f"^seed: {seed} is outside 0 … 4294967295$"):

@@ -201,6 +201,12 @@ def test_an_adapter_without_timers_gives_no_times(gpu: Gpu, scene: Scene, monkey
         volumetric(gpu, settings=replace(QUICK, size=(16, 9), shadow_size=64))
 
 
+def test_the_path_of_a_scene_is_no_scene() -> None:
+    for function in (render, compare):
+        with pytest.raises(ParameterError, match="^scene: 'room.json' is no Scene; tyndall.load reads one"):
+            function("room.json")  # type: ignore[operator]
+
+
 def test_a_vacuum_has_no_relative_error(gpu: Gpu, scene: Scene) -> None:
     vacuum = scene.with_(medium=Medium())
     found = compare(vacuum, size=(32, 18), volumetric=["froxel"], frames=1, warmup=0, adapter=gpu, parameters=SMALL)

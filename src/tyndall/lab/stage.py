@@ -41,8 +41,10 @@ def make(family: str, chosen: str | Technique | None, scene: Scene, parameters: 
     One made by name starts from the scene's looks; then ``parameters`` of its name apply.
 
     Raises:
-        ParameterError: no such technique or parameter.
+        ParameterError: no such technique or parameter, or no scene.
     """
+    if not isinstance(scene, Scene):
+        raise ParameterError(f"scene: {scene!r} is no Scene; tyndall.load reads one, tyndall.scenes has some")
     group = FAMILIES[family]
     name = chosen.name if isinstance(chosen, Technique) else chosen or group.default
     return group.make(chosen, scene.looks, (parameters or {}).get(name))

@@ -1,4 +1,7 @@
-"""No volumetric light: ``L_v = 0``, ``T = 1``, as in a vacuum."""
+"""No volumetric light: ``L_v = 0``, ``T = 1``, as if there were a vacuum before the camera.
+
+The base image is that of all techniques: the medium still dims point and spot lights on their way to a surface.
+"""
 
 from __future__ import annotations
 
