@@ -14,8 +14,7 @@ import itertools
 import math
 import time
 from collections import Counter, defaultdict
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +22,7 @@ from numpy.typing import NDArray
 from tyndall.content.mesh import DEPTH_FORMAT, GBUFFER_TARGETS, Meshes
 from tyndall.gpu.device import Gpu, GpuError
 from tyndall.gpu.params import ParameterError
-from tyndall.gpu.resources import Resource, Texture
+from tyndall.gpu.resources import Closing, Resource, Texture
 from tyndall.scene.model import (
     Camera,
     DirectionalLight,
@@ -62,7 +61,7 @@ _IMAGES = {
 _TARGETS = ("normal_roughness", "albedo_metallic", "emissive", "velocity")
 
 
-class Renderer:
+class Renderer(Closing):
     """Draws a scene with one technique of each family.
 
     Args:
@@ -325,14 +324,6 @@ class Renderer:
         self.gpu.forget_groups()
         if self._own_gpu:
             self.gpu.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
 
 # --- packing ------------------------------------------------------------------------------------------------------

@@ -20,7 +20,6 @@ import sys
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
@@ -32,6 +31,7 @@ from tyndall.gpu.resources import (
     BYTES_PER_TEXEL,
     Bound,
     Buffer,
+    Closing,
     Ledger,
     ParamsBuffer,
     Resource,
@@ -164,7 +164,7 @@ class _Program:
     groups: dict[tuple[int, ...], Any]
 
 
-class Gpu:
+class Gpu(Closing):
     """A device with its caches, ledger and timers.
 
     Args:
@@ -618,14 +618,6 @@ class Gpu:
                 timer.destroy()
             self._timed = False
         self.device.destroy()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
 
 class ComputePass:

@@ -10,7 +10,8 @@ import itertools
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from types import TracebackType
+from typing import Any, Self
 
 import numpy as np
 import wgpu
@@ -108,6 +109,22 @@ class Ledger:
         for owner, _, size in self._entries.values():
             totals[owner] += size
         return dict(totals)
+
+
+class Closing:
+    """Something that a ``with`` block closes at its end."""
+
+    def close(self) -> None:
+        """Free what is held; a second call does nothing."""
+        raise NotImplementedError
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
 
 
 class Resource:

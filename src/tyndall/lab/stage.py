@@ -10,8 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +18,7 @@ from numpy.typing import NDArray
 from tyndall.frame import Renderer
 from tyndall.gpu.device import Gpu
 from tyndall.gpu.params import ParameterError, fields_of, nearest
+from tyndall.gpu.resources import Closing
 from tyndall.lab.picture import Picture
 from tyndall.scene.model import Scene
 from tyndall.techniques import FAMILIES
@@ -67,7 +67,7 @@ def driver_name(gpu: Gpu) -> str:
     return f"{info['description']} ({info['backend_type']})".strip()
 
 
-class Stage:
+class Stage(Closing):
     """See the module.
 
     Args:
@@ -166,11 +166,3 @@ class Stage:
         self._renderer.close()
         if self._owned:
             self.gpu.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()

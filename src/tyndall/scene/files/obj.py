@@ -14,6 +14,7 @@ The text is not parsed line by line: lines are sorted by keyword, and numpy read
 
 from __future__ import annotations
 
+import math
 import warnings
 from dataclasses import dataclass, field
 from itertools import chain
@@ -253,6 +254,10 @@ def _parse_mixed(tokens: list[bytes]) -> Ints | None:
 # --- surface ------------------------------------------------------------------------------------------------------
 
 
+# Doubled vertices whose normals differ less than this (40°) are a seam of one smooth surface, not a crease.
+_SEAM_COSINE = math.cos(math.radians(40))
+
+
 class _Surface:
     """The whole file's geometry, from which each material's part is cut."""
 
@@ -268,7 +273,14 @@ class _Surface:
     def smooth(self) -> NDArray[np.float32]:
         """A normal for each position, over all faces of the file around it."""
         if self._smooth is None:
-            self._smooth = vertex_normals(self.positions, self._triangles[:, :, 0].astype(np.uint32))
+            triangles = self._triangles[:, :, 0].astype(np.uint32)
+            own = vertex_normals(self.positions, triangles)
+            # Patches that meet in doubled vertices are one surface, unless they meet at an angle.
+            places, place = np.unique(self.positions, axis=0, return_inverse=True)
+            place = place.reshape(-1)
+            shared = vertex_normals(places, place[triangles].astype(np.uint32))[place]
+            flat = (own * shared).sum(axis=1, keepdims=True) > _SEAM_COSINE
+            self._smooth = np.where(flat, shared, own)
         return self._smooth
 
     def mesh(self, triangles: Ints, material: Material, name: str) -> Mesh:

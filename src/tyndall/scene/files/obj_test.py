@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 from pathlib import Path
 
 import numpy as np
@@ -245,3 +246,20 @@ def test_real_files(name: str, triangles: int) -> None:
         faces = np.cross(b - a, c - a)
         agree = np.einsum("ij,ij->i", faces, normals[instance.mesh.indices[:, 0]]) > 0
         assert agree.mean() > 0.98  # winding and normals tell the same outside
+
+
+def test_doubled_vertices_of_a_smooth_surface_share_their_normal(tmp_path: Path) -> None:
+    """Patches that repeat the vertices of their common edge show no seam; a crease of 90° stays one."""
+    bend = math.radians(10)
+    for angle, smooth in ((bend, True), (math.pi / 2, False)):
+        x, y = 1 + math.cos(angle), math.sin(angle)
+        path = tmp_path / "patches.obj"
+        path.write_text(
+            f"v 0 0 0\nv 1 0 0\nv 1 0 1\nv 0 0 1\nv 1 0 0\nv {x} {y} 0\nv {x} {y} 1\nv 1 0 1\nf 1 4 3 2\nf 5 8 7 6\n"
+        )
+        (instance,) = load(path).instances
+        mesh = instance.mesh
+        assert mesh.normals is not None
+        edge = mesh.normals[np.isclose(mesh.positions, (1, 0, 0), atol=1e-6).all(axis=1)]
+        assert len(edge) == 2
+        assert np.allclose(edge[0], edge[1], atol=1e-6) == smooth

@@ -33,7 +33,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from tyndall.gpu.device import ADD, GpuError, Raster
+from tyndall.gpu.device import ADD, Raster
 from tyndall.gpu.params import param
 from tyndall.gpu.resources import Texture
 from tyndall.scene.model import DirectionalLight, Scene
@@ -96,7 +96,10 @@ class Polygonal(Technique):
         """Add the faces of (light, map) pairs."""
         gpu, physical = view.gpu, self.model == "physical"
         if "float32-blendable" not in gpu.features:
-            raise GpuError("polygonal adds up 32-bit floats, which this adapter cannot blend (float32-blendable)")
+            raise Unsupported(
+                "polygonal adds up 32-bit floats for this light, which this adapter cannot blend (float32-blendable): "
+                "use froxel or march"
+            )
         size = view.images["shadow_maps"].size[0]
         target = [(view.images["inscatter"].view(), None)]
         depth = (view.images["depth"].view(), None) if physical else None
