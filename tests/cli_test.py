@@ -305,6 +305,41 @@ def test_an_interrupt_leaves_no_half_written_file(folder: Path) -> None:
     assert list(folder.iterdir()) == []
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="signals and shells of POSIX")
+def test_an_interrupt_during_the_imports_is_quiet(folder: Path) -> None:
+    (folder / "numpy.py").write_text("import os, signal, time; os.kill(os.getpid(), signal.SIGINT); time.sleep(9)")
+    result = subprocess.run([sys.executable, "-m", "tyndall", "scenes"], capture_output=True, text=True, check=False)
+    assert (result.returncode, result.stdout, result.stderr) == (130, "", "")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals and shells of POSIX")
+def test_closed_and_full_streams_are_no_faults() -> None:
+    command = f"'{sys.executable}' -m tyndall scenes"
+    for redirection, code, said in ((">&-", 0, ""), (">/dev/full", 2, "tyndall: No space left on device\n")):
+        result = subprocess.run(f"{command} {redirection}", shell=True, capture_output=True, text=True, check=False)
+        assert (result.returncode, result.stderr) == (code, said)
+
+
+def test_parameters_in_a_scene_file_are_named_with_the_file(capsys: pytest.CaptureFixture[str], folder: Path) -> None:
+    looks = {"froxl": {"samples": 2}, "froxel": {"gird": [1, 1, 1]}, "march": {"steps": 0}}
+    (folder / "room.json").write_text(json.dumps({"version": 1, "looks": looks}))
+    code, _, err = run(capsys, "render", "room.json")
+    assert code == 2
+    assert err.splitlines() == [
+        "tyndall: room.json: looks.froxl: no such technique — did you mean 'froxel'?",
+        "tyndall: room.json: looks.froxel.gird: no such parameter — did you mean 'grid'?",
+        "tyndall: room.json: looks.march.steps: 0 is outside 1 … 30000",
+    ]
+
+
+def test_a_name_in_a_scene_file_cannot_steer_the_terminal(capsys: pytest.CaptureFixture[str], folder: Path) -> None:
+    (folder / "room.json").write_text(json.dumps({"version": 1, "name": "a\x1b[31m\nb"}))
+    code, out, _ = run(capsys, "render", "room.json", "--size", "8x8", "--frames", "1", "--technique", "off")
+    assert code == 0
+    assert "\x1b" not in out
+    assert len(out.splitlines()) == 2
+
+
 def test_the_command_is_installed_and_is_a_module() -> None:
     result = subprocess.run(
         [sys.executable, "-m", "tyndall", "render", "bocks"], capture_output=True, text=True, check=False

@@ -97,4 +97,4 @@ def test_the_wheel_holds_every_shader_and_the_command(tmp_path: Path) -> None:
     shaders = {path.relative_to(ROOT / "src").as_posix() for path in (ROOT / "src").rglob("*.wesl")}
     assert shaders
     assert shaders <= names
-    assert "tyndall = tyndall.app.cli:main" in entry_points
+    assert "tyndall = tyndall.__main__:main" in entry_points

@@ -125,7 +125,8 @@ def render(
         print(json.dumps(document, indent=2))
     else:
         width, height = picture.size
-        print(f"{files[0]}  ({described.name}, {technique}, {width}×{height}, {picture.metadata['adapter']})")
+        name = "".join(c if c.isprintable() else "\ufffd" for c in described.name)  # a file's, for a terminal
+        print(f"{files[0]}  ({name}, {technique}, {width}×{height}, {picture.metadata['adapter']})")
         print(files[1])
 
 
@@ -266,6 +267,9 @@ def main(words: Sequence[str] | None = None) -> int:
     Args:
         words: the arguments after the program's name; ``sys.argv`` if None.
     """
+    # A stream that was closed before the start is None. /dev/null takes its number, or the next file would.
+    sys.stdout = sys.stdout or open(os.devnull, "w")  # noqa: SIM115
+    sys.stderr = sys.stderr or open(os.devnull, "w")  # noqa: SIM115
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a terminal without "×" still gets its result
@@ -295,7 +299,7 @@ def _explain(error: Exception) -> tuple[str, int]:
         option, known = getattr(error, "option_name", None), getattr(error, "possibilities", None)
         if option is not None and hasattr(error, "possibilities"):
             return f"no such option {option}{nearest(option, known or ())}", MISTAKE
-        return error.format_message(), MISTAKE
+        return error.format_message().replace("Value error, ", ""), MISTAKE  # pydantic's words for its own
     # What the project raises on purpose is written for the user; but its shaders are its own.
     kind = type(error)
     if kind.__module__.startswith("tyndall.") and kind.__name__ != "ShaderError":
@@ -303,7 +307,7 @@ def _explain(error: Exception) -> tuple[str, int]:
     if isinstance(error, MemoryError) or kind.__name__ == "GPUOutOfMemoryError":
         return "not enough memory for what was asked", MISTAKE
     if isinstance(error, OSError) and error.strerror:
-        return f"{error.filename or 'system'}: {error.strerror}", MISTAKE
+        return f"{error.filename}: {error.strerror}" if error.filename else error.strerror, MISTAKE
     return f"this is a fault in Tyndall: {kind.__name__}: {error} (--debug shows where)", FAULT
 
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tyndall.gpu.params import ParameterError, nearest
+from tyndall.gpu.params import ParameterError, nearest, replace
 from tyndall.scene import bundled
+from tyndall.scene.errors import SceneError
 from tyndall.scene.files import MESH_SUFFIXES, SUFFIXES, load
 from tyndall.scene.model import Scene
 from tyndall.scene.stage import stage
@@ -34,4 +35,30 @@ def open_scene(name: str, lights: int | None = None) -> Scene:
     if lights is not None:
         raise ParameterError(f"--lights: {name} has its own lights; only a bundled scene places them")
     scene = load(path)
-    return stage(scene) if path.suffix.lower() in MESH_SUFFIXES else scene
+    if path.suffix.lower() in MESH_SUFFIXES:
+        return stage(scene)
+    _check_looks(scene, name)
+    return scene
+
+
+def _check_looks(scene: Scene, name: str) -> None:
+    """Parameters of techniques in a scene file are right, also those of techniques that are not drawn.
+
+    Raises:
+        SceneError: one line for each that is not.
+    """
+    from tyndall.techniques import FAMILIES
+
+    members = {member: cls for family in FAMILIES.values() for member, cls in family.members.items()}
+    wrong = []
+    for technique, look in scene.looks.items():
+        if technique not in members:
+            wrong.append(f"looks.{technique}: no such technique{nearest(technique, members)}")
+            continue
+        for parameter, value in look.items():
+            try:
+                replace(members[technique](), {parameter: value})
+            except ParameterError as error:
+                wrong.append(f"looks.{technique}.{error}")
+    if wrong:
+        raise SceneError(name, wrong)

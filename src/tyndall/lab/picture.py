@@ -37,9 +37,9 @@ class Picture:
         metadata: what made it ("scene", "technique", "adapter", …), written into the files.
     """
 
-    pixels: NDArray[np.uint8]
-    radiance: NDArray[np.float32]
-    depth: NDArray[np.float32]
+    pixels: NDArray[np.uint8] = field(repr=False)
+    radiance: NDArray[np.float32] = field(repr=False)
+    depth: NDArray[np.float32] = field(repr=False)
     metadata: Mapping[str, str] = field(default_factory=dict)
 
     @property

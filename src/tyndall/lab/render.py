@@ -46,4 +46,5 @@ def render(
         renderer = stage.use(technique)
         for _ in range(frames):
             renderer.draw()
+            stage.gpu.wait()  # an interrupt takes effect after one frame, not after all that are in flight
         return stage.picture(technique.name)
