@@ -332,6 +332,14 @@ def test_parameters_in_a_scene_file_are_named_with_the_file(capsys: pytest.Captu
     ]
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere a file's name is Unicode")
+def test_a_file_s_name_need_not_be_unicode(capsys: pytest.CaptureFixture[str], folder: Path) -> None:
+    name = os.fsdecode(b"caf\xe9.obj")
+    (folder / name).write_text(TETRAHEDRON)
+    assert run(capsys, "render", name, "--size", "8x8", "--frames", "1", "--technique", "off", "--out", "made")[0] == 0
+    assert pixels_of(folder / "made/off.png").shape == (8, 8, 3)
+
+
 def test_a_name_in_a_scene_file_cannot_steer_the_terminal(capsys: pytest.CaptureFixture[str], folder: Path) -> None:
     (folder / "room.json").write_text(json.dumps({"version": 1, "name": "a\x1b[31m\nb"}))
     code, out, _ = run(capsys, "render", "room.json", "--size", "8x8", "--frames", "1", "--technique", "off")

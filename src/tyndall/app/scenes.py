@@ -35,6 +35,7 @@ def open_scene(name: str, lights: int | None = None) -> Scene:
     if lights is not None:
         raise ParameterError(f"--lights: {name} has its own lights; only a bundled scene places them")
     scene = load(path)
+    scene = scene.with_(name=scene.name.encode(errors="replace").decode())  # a file's name need not be Unicode
     if path.suffix.lower() in MESH_SUFFIXES:
         return stage(scene)
     _check_looks(scene, name)
