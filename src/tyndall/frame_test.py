@@ -91,7 +91,8 @@ def test_depth_is_metres_along_the_view_axis(gpu: Gpu) -> None:
     depth = shoot(gpu, scene, size).depth
     assert np.array_equal(np.isinf(depth), np.isinf(expected))
     sure = np.isfinite(expected)
-    agree = np.abs(depth[sure] / expected[sure] - 1) < 1e-4
+    # Rasterisers snap vertices to 1/256 of a pixel; on a floor seen at this size that is some 1e-3 of its distance.
+    agree = np.abs(depth[sure] / expected[sure] - 1) < 3e-3
     assert agree.mean() > 0.98  # a centre on a silhouette may go either way
     assert {-1, 0, 1, 2} == set(np.unique(hit.instance))
 

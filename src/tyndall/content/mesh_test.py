@@ -95,7 +95,8 @@ def test_colours_are_decoded_and_data_is_not(gpu: Gpu) -> None:
     """Base colour and emission are sRGB, roughness and metallic are linear; factors multiply."""
     grey = np.full((1, 1, 4), (188, 128, 64, 255), np.uint8)
     base = drawn(gpu, replace(WHITE, base_color_texture=Texture(Image(grey)), base_color=(1, 1, 0.5, 1)))
-    np.testing.assert_allclose(base[18, 24], linear([188, 128, 64]) * [1, 1, 0.5], rtol=0.02)
+    # The G-buffer keeps albedo in 8 bits: half a step of a dark channel is 2 %.
+    np.testing.assert_allclose(base[18, 24], linear([188, 128, 64]) * [1, 1, 0.5], rtol=0.03)
     glow = replace(WHITE, base_color=(0, 0, 0, 1), emissive=(2, 3, 4), emissive_texture=Texture(Image(grey)))
     np.testing.assert_allclose(drawn(gpu, glow, ambient=0)[18, 24], linear([188, 128, 64]) * [2, 3, 4], rtol=0.01)
     # Green 102/255 = 0.4 of roughness 0.5, blue 204/255 = 0.8 of metallic 0.5.
