@@ -216,7 +216,7 @@ def test_bench_writes_its_figures_as_json_and_as_tables(
     [
         ("rendr box", "Did you mean 'render'?"),
         ("render", "SCENE"),
-        ("render bocks", "did you mean 'box'?"),
+        ("render boxs", "did you mean 'box'?"),
         ("render nothing.glb", "nothing.glb"),
         ("render .", "."),
         ("render box --siez 4x4", "did you mean '--size'?"),
@@ -266,8 +266,8 @@ def test_a_mistake_gets_one_line_and_leaves_nothing(
 
 
 def test_debug_shows_where_an_error_came_from() -> None:
-    with pytest.raises(ValueError, match="no scene 'bocks'"):
-        main(["render", "bocks", "--debug"])
+    with pytest.raises(ValueError, match="no scene 'boxs'"):
+        main(["render", "boxs", "--debug"])
 
 
 def test_a_fault_is_not_called_a_mistake(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
@@ -350,7 +350,7 @@ def test_a_name_in_a_scene_file_cannot_steer_the_terminal(capsys: pytest.Capture
 
 def test_the_command_is_installed_and_is_a_module() -> None:
     result = subprocess.run(
-        [sys.executable, "-m", "tyndall", "render", "bocks"], capture_output=True, text=True, check=False
+        [sys.executable, "-m", "tyndall", "render", "boxs"], capture_output=True, text=True, check=False
     )
     assert result.returncode == 2
     assert result.stderr.count("\n") == 1

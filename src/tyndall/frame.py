@@ -166,9 +166,7 @@ class Renderer(Closing):
             Unsupported: it cannot draw this scene; the one in use stays.
         """
         made = FAMILIES[family].make(technique, self.scene.looks)
-        supports = getattr(made, "supports", None)
-        if supports is not None:
-            supports(self.scene)
+        made.supports(self.scene)
         if family in self._views:
             self._views.pop(family).close()
             if family == "shadow":

@@ -102,6 +102,7 @@ def choose_adapter(name: str | None = None) -> wgpu.GPUAdapter:
             "no graphics adapter answers; on Debian or Ubuntu, 'apt-get install mesa-vulkan-drivers' gives a "
             "software one"
         )
+    asked = "" if name else " ($TYNDALL_ADAPTER)"
     name = name or os.environ.get("TYNDALL_ADAPTER") or None
     if name is None:
         best = found[0]
@@ -113,7 +114,7 @@ def choose_adapter(name: str | None = None) -> wgpu.GPUAdapter:
         if name.lower() in f"{info['device']} {info['vendor']} {info['backend_type']} {info['adapter_type']}".lower():
             return adapter
     known = ", ".join(f"'{a.info['device']}' ({a.info['backend_type']})" for a in found)
-    raise GpuError(f"no adapter matches '{name}'; there are {known}")
+    raise GpuError(f"no adapter matches '{name}'{asked}; there are {known}")
 
 
 @dataclass(frozen=True)

@@ -100,7 +100,7 @@ def fields_of(cls: type) -> tuple[Field, ...]:
 
 def nearest(name: str, known: Iterable[str]) -> str:
     """A trailing phrase that offers the nearest known name: `` — did you mean 'froxel'?``; empty when none is near."""
-    match = difflib.get_close_matches(name, list(known), n=1, cutoff=0.5)
+    match = difflib.get_close_matches(name, list(known), n=1, cutoff=0.6)
     return f" — did you mean '{match[0]}'?" if match else ""
 
 

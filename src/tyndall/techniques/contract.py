@@ -39,6 +39,9 @@ class Technique:
     def __post_init__(self) -> None:
         check(self)
 
+    def supports(self, scene: Scene) -> None:
+        """Raise :class:`Unsupported` if the technique cannot draw a scene."""
+
     @classmethod
     def shader(cls) -> str:
         """The WESL module beside the technique's Python module."""

@@ -10,10 +10,10 @@ scene, or ``far``), clipped to the medium's box; what lies beyond the last slice
 a shadow map.
 
 ``model="paper"`` is S1's equations 10–12: ``L = L_c·V·ρ(g)·C_s·density·D(k)``, summed without extinction and added to
-an unattenuated base image; light is not dimmed by the medium, only directional lights are known, and a pixel takes
-the value of its froxel's layer. Slices are uniform in view depth, ``z_k = k·z_limit/D``: that is what equation 10
-says, which scales a homogeneous vector. (Its prose says uniform in clip depth, which would put 127 of 128 slices into
-the first 1.3 m of a view whose near plane is at 1 cm.) Where ``z_limit`` is 0 it is the far side of the scene.
+an unattenuated base image; light is not dimmed by the medium, lights other than directional are refused, and a pixel
+takes the value of its froxel's layer. Slices are uniform in view depth, ``z_k = k·z_limit/D``: that is what equation
+10 says, which scales a homogeneous vector. (Its prose says uniform in clip depth, which would put 127 of 128 slices
+into the first 1.3 m of a view whose near plane is at 1 cm.) Where ``z_limit`` is 0 it is the far side of the scene.
 """
 
 from __future__ import annotations
@@ -22,7 +22,9 @@ from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 from tyndall.gpu.params import param
+from tyndall.scene.model import Scene
 from tyndall.techniques.contract import Technique, View
+from tyndall.techniques.volumetric.paper import refuse_near_lights
 
 
 @dataclass(frozen=True)
@@ -50,6 +52,11 @@ class Froxel(Technique):
     g: float = param(0.4, -0.99, 0.99, "mean cosine of the phase function (paper)")
     density: float = param(1.0, 0, None, "density of the medium (paper)")
     c_s: float = param(0.1, 0, None, "scattering constant (paper)", unit="1/m")
+
+    def supports(self, scene: Scene) -> None:
+        """Raise :class:`Unsupported` for a light that the paper's equations cannot describe."""
+        if self.model == "paper":
+            refuse_near_lights(self, scene)
 
     def render(self, view: View) -> None:
         """Scatter, accumulate, apply."""

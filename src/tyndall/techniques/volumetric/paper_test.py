@@ -144,7 +144,7 @@ def test_polygonal_in_a_closed_room_is_the_march(gpu: Gpu, direction: tuple[floa
     assert abs(got.inscattered.mean() / expected.mean() - 1) < 0.03
 
 
-@pytest.mark.parametrize("name", ["polygonal"])
+@pytest.mark.parametrize("name", ["screen_space", "polygonal", "froxel"])
 def test_the_paper_knows_parallel_light_only(gpu: Gpu, name: str) -> None:
     with pytest.raises(Unsupported, match="directional") as error:
         shoot(gpu, Scene([], [PointLight()], AHEAD), volumetric=paper(name))

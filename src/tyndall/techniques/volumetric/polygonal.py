@@ -39,6 +39,7 @@ from tyndall.gpu.resources import Texture
 from tyndall.scene.model import DirectionalLight, Scene
 from tyndall.techniques.contract import Technique, Unsupported, View
 from tyndall.techniques.shadow.shadow_map import first_layers, layer_count
+from tyndall.techniques.volumetric.paper import refuse_near_lights
 
 _STATE = Raster(targets=(("rgba32float", ADD),), topology="triangle-strip")
 # The mesh lies on the lit surfaces, where G = 0: pushed back a little, those faces fail the depth test.
@@ -63,13 +64,9 @@ class Polygonal(Technique):
     tau: float = param(0.3, 1e-9, None, "extinction coefficient (paper)", unit="1/m")
 
     def supports(self, scene: Scene) -> None:
-        """Raise :class:`Unsupported` if the paper's equation cannot describe a light."""
-        for index, light in enumerate(scene.lights):
-            if self.model == "paper" and not isinstance(light, DirectionalLight):
-                raise Unsupported(
-                    f"polygonal's paper model knows directional lights only, and lights[{index}] is a {light.kind} "
-                    "light: use model physical"
-                )
+        """Raise :class:`Unsupported` for a light that the paper's equation cannot describe."""
+        if self.model == "paper":
+            refuse_near_lights(self, scene)
 
     def render(self, view: View) -> None:
         """Walk the maps for directional lights, and draw every face of the other lights' meshes."""

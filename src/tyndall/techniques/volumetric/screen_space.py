@@ -6,7 +6,7 @@ picture, in front of the light but not in front of the sky, or off the line to t
 
 ``model="paper"`` is S1's equations 6–8: ``L_v = exposure · Σ_i decay^i · weight · L_c·V(p_i)/N`` with
 ``p_i = p + i·(p_l − p)/N`` for i = 1 … N and ``V = 1`` where the depth is the sky's and ``p_i`` lies in the picture. It
-is added to an unattenuated base image.
+is added to an unattenuated base image. Lights other than directional are refused.
 
 ``model="physical"`` scatters in the scene's medium: the mean visibility ``V̄ = Σ decay^i·V / Σ decay^i`` multiplies
 the airlight of the unshadowed ray, ``σs·p·E·(1 − e^(−σt·d))/σt`` for a directional light, and its quadrature for a
@@ -23,7 +23,9 @@ from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 from tyndall.gpu.params import param
+from tyndall.scene.model import Scene
 from tyndall.techniques.contract import Technique, View
+from tyndall.techniques.volumetric.paper import refuse_near_lights
 
 
 @dataclass(frozen=True)
@@ -41,6 +43,11 @@ class ScreenSpace(Technique):
     decay: float = param(1.0, 0, 1, "weight of a sample relative to the one before")
     exposure: float = param(1.0, 0, None, "strength of the effect (paper)")
     weight: float = param(0.01, 0, None, "strength of a sample (paper)")
+
+    def supports(self, scene: Scene) -> None:
+        """Raise :class:`Unsupported` for a light that the paper's equations cannot describe."""
+        if self.model == "paper":
+            refuse_near_lights(self, scene)
 
     def render(self, view: View) -> None:
         """One pass; a batch of lights a dispatch would not be faster."""
