@@ -32,6 +32,7 @@ from tyndall.scene.model import (
     Scene,
     Schlick,
     SpotLight,
+    box_corners,
 )
 from tyndall.techniques import FAMILIES, Technique
 from tyndall.techniques.contract import View
@@ -111,6 +112,8 @@ class Renderer(Closing):
         self._frame = 0
         self._history = 0
         self._previous: NDArray[np.float64] | None = None
+        self._camera_seen: Camera | None = None
+        self._camera_row: Any = None
         try:
             self._setup(techniques)
         except BaseException:
@@ -147,8 +150,6 @@ class Renderer(Closing):
         }
         gpu.write(self._medium, pack_medium(self.scene.medium, gpu.dtype(_MEDIUM)))
         gpu.write(self._lights, pack_lights(self.scene, gpu.dtype(_LIGHT)))
-        self._camera_seen: Camera | None = None
-        self._camera_row: Any = None
         for family, technique in techniques.items():
             self.use(family, technique)
 
@@ -403,9 +404,7 @@ def air_box(scene: Scene) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 def depth_range(camera: Camera, scene: Scene) -> tuple[float, float]:
     """View depths between which the medium lies: its box, or from the camera to the scene's far side."""
-    low, high = air_box(scene)
-    corners = np.array([[(low, high)[(i >> axis) & 1][axis] for axis in range(3)] for i in range(8)])
-    depth = (corners - np.asarray(camera.position)) @ -view_matrix(camera)[2, :3]
+    depth = (box_corners(*air_box(scene)) - np.asarray(camera.position)) @ -view_matrix(camera)[2, :3]
     start = 0.0 if scene.medium.bounds is None else max(0.0, float(depth.min()))
     return start, max(float(depth.max()), start + 10 * camera.near)
 

@@ -651,7 +651,7 @@ class ComputePass:
         gpu = self._gpu
         program = gpu._program(self._module, (self._entry,), self._bound, self._overlay, self._features, None)
         group = gpu._group(program, self._bound)
-        x, y, z = _workgroup(gpu, self._module, self._entry)
+        x, y, z = gpu.linker.workgroup(self._module, self._entry)
         encoder = gpu.encoder
         stamps = gpu.timestamps(self._label)
         native = encoder.begin_compute_pass(label=self._label, **({"timestamp_writes": stamps} if stamps else {}))
@@ -659,16 +659,6 @@ class ComputePass:
         native.set_bind_group(0, group)
         native.dispatch_workgroups(-(-width // x), -(-height // y), -(-depth // z))
         native.end()
-
-
-_workgroups: dict[tuple[str, str], tuple[int, int, int]] = {}
-
-
-def _workgroup(gpu: Gpu, module: str, entry: str) -> tuple[int, int, int]:
-    key = (module, entry)
-    if key not in _workgroups:
-        _workgroups[key] = gpu.linker.workgroup(module, entry)
-    return _workgroups[key]
 
 
 def _as_bound(value: Any) -> Bound:

@@ -133,6 +133,7 @@ class Resource:
     def __init__(self, ledger: Ledger, owner: str, label: str, size: int, native: Any) -> None:
         self.owner, self.label, self.size_bytes, self.native = owner, label, size, native
         self._ledger, self._serial = ledger, next(_serial)
+        self._bounds: dict[str, Bound] = {}
         ledger.add(self._serial, owner, label, size)
 
     def destroy(self) -> None:
@@ -141,10 +142,6 @@ class Resource:
             self.native.destroy()
             self._ledger.remove(self._serial)
             self.native = None
-
-
-def _uniform_slot(struct: str, preamble: str) -> Slot:
-    return Slot(f"var<uniform> {{name}}: {struct};", (("buffer", (("type", "uniform"),)),), _ALL, preamble)
 
 
 class Buffer(Resource):
@@ -163,40 +160,24 @@ class Buffer(Resource):
             return self.element.rpartition("::")[2], f"import {self.element};"
         return self.element, ""
 
-    def _bound(
-        self, declaration: str, kind: str, visibility: int, *, offset: int = 0, size: int | None = None
-    ) -> Bound:
-        name, preamble = self._named()
-        slot = Slot(declaration.replace("ELEMENT", name), (("buffer", (("type", kind),)),), visibility, preamble)
-        size = self.size_bytes - offset if size is None else size
-        return Bound(slot, {"buffer": self.native, "offset": offset, "size": size})
-
     def read(self) -> Bound:
         """``var<storage, read> name: array<element>``."""
-        return self._cached("read", "var<storage, read> {name}: array<ELEMENT>;", "read-only-storage", _ALL)
+        return self._bound("var<storage, read> {name}: array<ELEMENT>;", "read-only-storage", _ALL, self.size_bytes)
 
     def read_write(self) -> Bound:
         """``var<storage, read_write> name: array<element>``, in compute only."""
-        return self._cached("rw", "var<storage, read_write> {name}: array<ELEMENT>;", "storage", _COMPUTE)
+        return self._bound("var<storage, read_write> {name}: array<ELEMENT>;", "storage", _COMPUTE, self.size_bytes)
 
-    def uniform(self, index: int = 0, stride: int = 0) -> Bound:
-        """``var<uniform> name: element``; with ``stride``, the element that begins at byte ``index·stride``."""
-        key = f"uniform{index}"
-        if key not in self._cache:
-            self._cache[key] = self._bound(
-                "var<uniform> {name}: ELEMENT;", "uniform", _ALL, offset=index * stride, size=self.dtype.itemsize
-            )
-        return self._cache[key]
+    def uniform(self) -> Bound:
+        """``var<uniform> name: element``, the first one."""
+        return self._bound("var<uniform> {name}: ELEMENT;", "uniform", _ALL, self.dtype.itemsize)
 
-    @property
-    def _cache(self) -> dict[str, Bound]:
-        cache: dict[str, Bound] = self.__dict__.setdefault("_bounds", {})
-        return cache
-
-    def _cached(self, key: str, declaration: str, kind: str, visibility: int) -> Bound:
-        if key not in self._cache:
-            self._cache[key] = self._bound(declaration, kind, visibility)
-        return self._cache[key]
+    def _bound(self, declaration: str, kind: str, visibility: int, size: int) -> Bound:
+        if kind not in self._bounds:
+            name, preamble = self._named()
+            slot = Slot(declaration.replace("ELEMENT", name), (("buffer", (("type", kind),)),), visibility, preamble)
+            self._bounds[kind] = Bound(slot, {"buffer": self.native, "offset": 0, "size": size})
+        return self._bounds[kind]
 
 
 class ParamsBuffer(Resource):
@@ -206,7 +187,8 @@ class ParamsBuffer(Resource):
 
     @staticmethod
     def slot(name: str, struct: str) -> Slot:
-        return _uniform_slot(name, struct)
+        """The uniform of a struct of this name, with the WESL text that declares it."""
+        return Slot(f"var<uniform> {{name}}: {name};", (("buffer", (("type", "uniform"),)),), _ALL, struct)
 
 
 class Texture(Resource):
@@ -216,24 +198,21 @@ class Texture(Resource):
     size: tuple[int, int, int]
     dimension: str  # "2d", "2d-array" or "3d"
 
-    @property
-    def _cache(self) -> dict[Any, Any]:
-        cache: dict[Any, Any] = self.__dict__.setdefault("_bounds", {})
-        return cache
+    def __init__(self, ledger: Ledger, owner: str, label: str, size: int, native: Any) -> None:
+        super().__init__(ledger, owner, label, size, native)
+        self._views: dict[int | None, Any] = {}
 
     def view(self, *, layer: int | None = None) -> Any:
         """A native view: of everything, or of one layer as 2-D."""
-        key = ("view", layer)
-        if key not in self._cache:
-            if layer is None:
-                self._cache[key] = self.native.create_view(dimension=self.dimension)
-            else:
-                self._cache[key] = self.native.create_view(dimension="2d", base_array_layer=layer, array_layer_count=1)
-        return self._cache[key]
+        if layer not in self._views:
+            part = {} if layer is None else {"base_array_layer": layer, "array_layer_count": 1}
+            dimension = self.dimension if layer is None else "2d"
+            self._views[layer] = self.native.create_view(dimension=dimension, **part)
+        return self._views[layer]
 
     def sampled(self) -> Bound:
         """As a sampled texture: ``texture_2d<f32>``, ``texture_3d<f32>``, ``texture_depth_2d_array`` …"""
-        if "sampled" not in self._cache:
+        if "sampled" not in self._bounds:
             suffix = self.dimension.replace("-", "_")
             depth = self.format.startswith("depth")
             scalar = "u32" if self.format.endswith("uint") else "f32"
@@ -242,9 +221,8 @@ class Texture(Resource):
             if self.format in ("r32float", "rg32float", "rgba32float"):
                 kind = "unfilterable-float"
             layout = (("texture", (("sample_type", kind), ("view_dimension", self.dimension))),)
-            self._cache["sampled"] = Bound(Slot(f"var {{name}}: {wesl};", layout, _ALL), self.view())
-        sampled: Bound = self._cache["sampled"]
-        return sampled
+            self._bounds["sampled"] = Bound(Slot(f"var {{name}}: {wesl};", layout, _ALL), self.view())
+        return self._bounds["sampled"]
 
     def write(self) -> Bound:
         """As a write-only storage texture, in compute only."""
@@ -255,14 +233,13 @@ class Texture(Resource):
         return self._storage("read_write", "read-write")
 
     def _storage(self, wesl: str, access: str) -> Bound:
-        if wesl not in self._cache:
+        if wesl not in self._bounds:
             layout = (
                 ("storage_texture", (("access", access), ("format", self.format), ("view_dimension", self.dimension))),
             )
             declaration = f"var {{name}}: texture_storage_{self.dimension.replace('-', '_')}<{self.format}, {wesl}>;"
-            self._cache[wesl] = Bound(Slot(declaration, layout, _COMPUTE), self.view())
-        stored: Bound = self._cache[wesl]
-        return stored
+            self._bounds[wesl] = Bound(Slot(declaration, layout, _COMPUTE), self.view())
+        return self._bounds[wesl]
 
 
 class Sampler:

@@ -56,6 +56,7 @@ class Linker:
     modules: dict[str, str] = field(default_factory=dict)
     filenames: dict[str, str] = field(default_factory=dict)
     _dtypes: dict[str, np.dtype[Any]] = field(default_factory=dict, repr=False)
+    _workgroups: dict[tuple[str, str], tuple[int, int, int]] = field(default_factory=dict, repr=False)
 
     @classmethod
     def of_package(cls, package: str = "tyndall") -> Linker:
@@ -82,8 +83,11 @@ class Linker:
 
     def workgroup(self, module: str, entry: str) -> tuple[int, int, int]:
         """The workgroup size of a compute entry point."""
+        if (module, entry) in self._workgroups:
+            return self._workgroups[module, entry]
         for point in wesl.reflect.classify_entry_points(self._compiler, module):
             if point.fn_name == entry and point.workgroup_size is not None:
+                self._workgroups[module, entry] = point.workgroup_size
                 return point.workgroup_size
         raise ShaderError(f"{self.filenames.get(module, module)}:1:1: no compute entry point '{entry}'")
 

@@ -276,6 +276,11 @@ def _unit(normals: NDArray[np.float32]) -> NDArray[np.float32]:
     return (normals / length).astype(np.float32)
 
 
+def box_corners(low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The (8, 3) corners of the axis-aligned box between two of them, each (3,)."""
+    return np.array([[(low, high)[(i >> axis) & 1][axis] for axis in range(3)] for i in range(8)])
+
+
 def vertex_normals(positions: NDArray[np.float32], indices: NDArray[np.uint32]) -> NDArray[np.float32]:
     """Area-weighted vertex normals, (V, 3) unit float32; +Y where the area around is 0 or beyond float32."""
     a, b, c = (positions[indices[:, i]] for i in range(3))
@@ -365,9 +370,8 @@ class Scene:
         lows, highs = [], []
         for instance in self.instances:
             low, high = (c.astype(np.float64) for c in instance.mesh.bounds)
-            corners = np.array([[(low, high)[(i >> axis) & 1][axis] for axis in range(3)] for i in range(8)])
             matrix = np.asarray(instance.transform)
-            world = corners @ matrix[:3, :3].T + matrix[:3, 3]
+            world = box_corners(low, high) @ matrix[:3, :3].T + matrix[:3, 3]
             lows.append(world.min(axis=0))
             highs.append(world.max(axis=0))
         if not lows:

@@ -116,9 +116,9 @@ class View:
         self._resources[label] = made
         return made
 
-    def compute(self, entry: str, *, module: str | None = None) -> ComputePass:
+    def compute(self, entry: str) -> ComputePass:
         """A compute pass named ``family.technique.entry`` that runs this entry point of the technique's shader."""
-        made = self.gpu.compute(f"{self.owner}.{entry}", module or self.technique.shader(), entry)
+        made = self.gpu.compute(f"{self.owner}.{entry}", self.technique.shader(), entry)
         return made.bind(self.scope, params=self.params).overlay(self.overlay)
 
     def resources(self) -> list[Resource]:

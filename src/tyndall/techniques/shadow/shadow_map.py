@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tyndall.gpu.params import param
-from tyndall.scene.model import DirectionalLight, Light, PointLight, Scene, SpotLight
+from tyndall.scene.model import DirectionalLight, Light, PointLight, Scene, SpotLight, box_corners
 from tyndall.techniques.contract import Technique, View, Visibility
 
 if TYPE_CHECKING:
@@ -102,8 +102,7 @@ def first_layers(scene: Scene) -> list[int]:
 
 def light_layers(scene: Scene, size: int) -> list[Layer]:
     """The maps of all lights, in order, for maps of ``size`` texels."""
-    low, high = scene.bounds
-    corners = np.array([[(low, high)[(i >> axis) & 1][axis] for axis in range(3)] for i in range(8)])
+    corners = box_corners(*scene.bounds)
     layers: list[Layer] = []
     for light in scene.lights:
         if isinstance(light, DirectionalLight):
