@@ -27,7 +27,7 @@ format: $(READY)
 # One lock for the package and its tools, for every platform, without index addresses. Needs uv.
 lock:
 	uv pip compile pyproject.toml --group dev --universal --python-version 3.12 --generate-hashes \
-		--no-annotate --no-header --no-emit-index-url --upgrade --output-file requirements.lock
+		--no-annotate --no-header --upgrade --output-file requirements.lock
 
 clean:
 	rm -rf .venv out .mypy_cache .pytest_cache .ruff_cache
