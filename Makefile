@@ -26,7 +26,7 @@ format: $(READY)
 
 # One lock for the package and its tools, for every platform, without index addresses. Needs uv.
 lock:
-	uv pip compile pyproject.toml --group dev --universal --python-version 3.12 --generate-hashes \
+	uv pip compile pyproject.toml --group dev --extra truth --extra sweep --universal --python-version 3.12 --generate-hashes \
 		--no-annotate --no-header --upgrade --output-file requirements.lock
 
 clean:
