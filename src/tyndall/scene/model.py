@@ -113,12 +113,16 @@ class Medium(_Checked):
 
 @dataclass(frozen=True)
 class DirectionalLight(_Checked):
-    """A light at infinity. ``intensity`` is the illuminance in lux of a surface that faces it."""
+    """A light at infinity. ``intensity`` is the illuminance in lux of a surface that faces it.
+
+    With an ``angular_diameter`` (the sun's is 0.0093) its rays fill a cone evenly, and shadows have a penumbra.
+    """
 
     kind: ClassVar[str] = "directional"
     direction: Vec3 = param((0.0, -1.0, 0.0), doc="direction in which the light travels; any length but zero")
     intensity: float = param(1.0, 0, None, "illuminance", unit="lx")
     color: Vec3 = param((1.0, 1.0, 1.0), 0, None, "linear colour, multiplies the intensity")
+    angular_diameter: float = param(0.0, 0, 3, "angle that the light fills in the sky", unit="rad")
 
     def __post_init__(self) -> None:
         check(self)
@@ -128,17 +132,25 @@ class DirectionalLight(_Checked):
 
 @dataclass(frozen=True)
 class PointLight(_Checked):
-    """A light that shines equally in all directions. ``intensity`` is in candela; illuminance falls with 1/r²."""
+    """A light that shines equally in all directions. ``intensity`` is in candela; illuminance falls with 1/r².
+
+    With a ``radius`` it is a sphere of even radiance, ``intensity / (π·radius²)``, and shadows have a penumbra. Outside
+    it gives the illuminance of the point at its centre. It is no surface: rays and eyes pass through it.
+    """
 
     kind: ClassVar[str] = "point"
     position: Vec3 = param((0.0, 0.0, 0.0), doc="position", unit="m")
     intensity: float = param(1.0, 0, None, "luminous intensity", unit="cd")
     color: Vec3 = param((1.0, 1.0, 1.0), 0, None, "linear colour, multiplies the intensity")
+    radius: float = param(0.0, 0, None, "radius of the sphere that shines; 0 is a point", unit="m")
 
 
 @dataclass(frozen=True)
 class SpotLight(_Checked):
-    """A cone of light, with glTF's falloff (KHR_lights_punctual) between the inner and the outer angle."""
+    """A cone of light, with glTF's falloff (KHR_lights_punctual) between the inner and the outer angle.
+
+    A ``radius`` is that of a :class:`PointLight`; the falloff stays that of the point at its centre.
+    """
 
     kind: ClassVar[str] = "spot"
     position: Vec3 = param((0.0, 0.0, 0.0), doc="position", unit="m")
@@ -147,6 +159,7 @@ class SpotLight(_Checked):
     color: Vec3 = param((1.0, 1.0, 1.0), 0, None, "linear colour, multiplies the intensity")
     inner_angle: float = param(0.0, 0, math.pi / 2, "half angle of the full-intensity cone", unit="rad")
     outer_angle: float = param(math.pi / 4, 1e-3, 1.5, "half angle of the cone; beyond it is dark", unit="rad")
+    radius: float = param(0.0, 0, None, "radius of the sphere that shines; 0 is a point", unit="m")
 
     def __post_init__(self) -> None:
         check(self)

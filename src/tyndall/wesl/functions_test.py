@@ -8,18 +8,22 @@ import numpy as np
 import props
 import pytest
 
-from tyndall.frame import pack_camera
+from tyndall.frame import pack_camera, pack_lights
 from tyndall.gpu.device import Gpu
 from tyndall.scene.model import (
     Camera,
+    DirectionalLight,
     Gibbons,
     HenyeyGreenstein,
     Isotropic,
+    Light,
     Material,
     Phase,
+    PointLight,
     Rayleigh,
     Scene,
     Schlick,
+    SpotLight,
 )
 
 PHASES: list[tuple[int, float, Phase]] = [
@@ -109,6 +113,50 @@ def test_where_a_ray_is_inside_a_box(gpu: Gpu) -> None:
             assert inside.any() or (scale == 1 and limit == 0.5)
             np.testing.assert_allclose(columns[inside], np.stack([begin, end], 1)[inside], rtol=1e-4, atol=1e-4)
             assert np.allclose(columns[~inside, 0], columns[~inside, 1])
+
+
+SEEN = """
+    import package::wesl::light::{DIRECTIONAL, POINT, Light, seen_from};
+    fn evaluate(x: vec4f) -> vec4f {
+        var light: Light;
+        light.kind = select(POINT, DIRECTIONAL, x.z < 0.0);
+        light.direction = vec3f(0.0, -1.0, 0.0);
+        light.position = vec3f(2.0, 3.0, 1.0);
+        light.radius = x.x;
+        let p = light.position + vec3f(0.36, 0.48, -0.8) * x.y;
+        let seen = seen_from(light, p);
+        return vec4f(seen.spread, seen.reach, dot(seen.axis, vec3f(-0.36, -0.48, 0.8)), seen.axis.y);
+    }
+"""
+
+
+def test_a_sphere_fills_the_cone_of_its_tangents(gpu: Gpu) -> None:
+    """sin θ = r/d, for the smallest angles too, where 1 − cos θ is below a cosine's last bit; inside a half space."""
+    radius, distance = (a.ravel() for a in np.meshgrid([0, 1e-5, 1e-3, 0.1, 1.0, 5.0], [0.5, 1.5, 40.0]))
+    rows = np.stack([radius, distance, np.ones_like(radius), radius], axis=1)
+    got = props.evaluate(gpu, "test_seen_sphere", SEEN, rows)
+    outside = radius < distance
+    half = np.arcsin(np.where(outside, radius / distance, 1))
+    np.testing.assert_allclose(got[:, 0], np.where(outside, 2 * np.sin(half / 2) ** 2, 1), rtol=1e-4, atol=1e-12)
+    np.testing.assert_allclose(got[:, 1], distance, rtol=1e-5)
+    np.testing.assert_allclose(got[:, 2], 1, atol=1e-5)
+
+
+@pytest.mark.parametrize("light", [DirectionalLight(), PointLight(), SpotLight()])
+def test_a_light_without_a_radius_fills_nothing(gpu: Gpu, light: Light) -> None:
+    (row,) = pack_lights(Scene(lights=[light]), gpu.dtype("package::wesl::light::Light"))
+    assert row["radius"] == 0
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-4, 0.0093, 0.5, 3.0])
+def test_a_directional_light_fills_its_angle(gpu: Gpu, angle: float) -> None:
+    light = DirectionalLight((0, -1, 0), angular_diameter=angle)
+    (row,) = pack_lights(Scene(lights=[light]), gpu.dtype("package::wesl::light::Light"))
+    got = props.evaluate(gpu, f"test_seen_sun_{angle:g}".replace(".", "_").replace("-", "_"), SEEN,
+                         np.array([[row["radius"], 1, -1, 0]]))  # fmt: skip
+    assert got[0, 0] == pytest.approx(2 * math.sin(angle / 4) ** 2, rel=1e-5)
+    assert got[0, 1] == 1e9
+    assert got[0, 3] == 1
 
 
 BRDF = """

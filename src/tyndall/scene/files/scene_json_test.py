@@ -312,6 +312,8 @@ def test_awkward_names_are_no_trouble(scene: Scene, tmp_path: Path) -> None:
 # Where in the file, what is put there, and the line that must come of it.
 MISTAKES: list[tuple[str, Any, str]] = [
     ("lights.0.intensity", -1, "lights[0].intensity: -1 is outside ≥ 0"),
+    ("lights.1.radius", -0.5, "lights[1].radius: -0.5 is outside ≥ 0"),
+    ("lights.2.angular_diameter", 4, "lights[2].angular_diameter: 4 is outside 0 … 3"),
     ("lights.1.intensty", 3, "lights[1].intensty: no such field — did you mean 'intensity'?"),
     ("lights.1.position", [0, "x", 0], "lights[1].position[1]: 'x' is not a number"),
     ("lights.1.color", [1, 1], "lights[1].color[2]: is missing"),
