@@ -22,8 +22,8 @@ from typer.exceptions import TyperException
 from tyndall import __version__
 from tyndall.app import arguments, console
 from tyndall.app.arguments import Overrides
-from tyndall.app.scenes import open_scene
 from tyndall.gpu.params import ParameterError, fields_of, nearest
+from tyndall.lab.scenes import open_scene
 
 DONE, FAULT, MISTAKE, INTERRUPTED = 0, 1, 2, 130
 

@@ -33,7 +33,7 @@ def open_scene(name: str, lights: int | None = None) -> Scene:
             f"no scene '{name}'{nearest(name, bundled.SCENES)}; there are {known}, and files of {', '.join(SUFFIXES)}"
         )
     if lights is not None:
-        raise ParameterError(f"--lights: {name} has its own lights; only a bundled scene places them")
+        raise ParameterError(f"lights: {name} has its own lights; only a bundled scene places them")
     scene = load(path)
     scene = scene.with_(name=scene.name.encode(errors="replace").decode())  # a file's name need not be Unicode
     if path.suffix.lower() in MESH_SUFFIXES:
