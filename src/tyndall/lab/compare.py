@@ -475,7 +475,7 @@ def _one(
         bias = metrics.bias(still.light, reference.light)
         error_map = metrics.error_map(still.light, reference.light)
         if rel_rmse is not None and bias is not None:
-            error = Error(rel_rmse, bias, metrics.psnr(still.picture.pixels, reference.picture.pixels))
+            error = Error(rel_rmse, bias, metrics.picture_psnr(still.picture.pixels, reference.picture.pixels))
     return Result(
         label=label,
         technique=technique.name,

@@ -1,27 +1,144 @@
 """How far a picture is from the truth.
 
-Errors of light are taken on linear float32 radiance before tone mapping, over all pixels and channels alike, so that no
-transfer curve hides or exaggerates them. They are relative to the reference's mean ``m``, which makes them comparable
-between scenes of any brightness:
+All errors are taken on linear float32 light before tone mapping, over all pixels and channels alike, so that no
+transfer curve hides or exaggerates them. With ``x`` the picture, ``r`` the reference and ``m`` the reference's mean:
 
-- ``rel_rmse = sqrt(mean((x − r)²)) / m``. A technique that gives no light at all scores ``sqrt(mean(r²)) / m ≥ 1``.
+- ``rmse = sqrt(mean((x − r)²))``, in the unit of the light.
+- ``rel_rmse = rmse / m``: comparable between scenes of any brightness. A technique that gives no light at all scores
+  ``sqrt(mean(r²)) / m ≥ 1``.
+- ``rel_rmse_corrected = sqrt(max(0, mse − mean(se²))) / m`` where the reference has a known standard error ``se``: the
+  expected square of its noise is taken off, so that ``mse − mean(se²)`` is unbiased for the technique's own error.
+- ``relmse = mean((x − r)² / (r² + ε))``: every pixel relative to itself, so that dark parts count. ε = 0.01·m², which
+  is the 0.01 of Rousselle, Knaus and Zwicker (2011, *Adaptive sampling and reconstruction using greedy error
+  minimization*) for a picture whose mean is 1.
 - ``bias = mean(x − r) / m``: the signed part; −1 means that all of the light is missing. An error that is all noise
   has a bias near 0; always ``rel_rmse ≥ |bias|``, with equality where the error is the same everywhere.
-- ``best_scale``: the factor that, applied to ``x``, brings it nearest to the reference. With it,
-  :func:`scaled_rel_rmse` tells the shape of the light apart from its strength: of use for a model without units.
+- ``psnr = 20·log10(peak / rmse)`` in dB, with the reference's :func:`peak`.
+- ``ssim``: structural similarity of Wang et al. (2004), Gaussian window of σ = 1.5 pixels, data range ``peak``, mean of
+  the channels (scikit-image).
+- ``flip``: mean HDR-FLIP of Andersson et al. (2021, *Visualizing errors in rendered high dynamic range images*): the
+  difference that a person notices who flips between the two, from 0 to 1, at the exposures that the reference's light
+  asks for; 67 pixels per degree. It alone tone-maps, inside the metric, as its definition asks (NVIDIA's
+  ``flip-evaluator``, BSD-3-Clause).
+- ``boundary``: the relative RMSE over the pixels near an edge of a shadow (:func:`shadow_edges`), relative to the same
+  ``m``, with the reference's noise taken off.
+- ``best_scale``: the factor that, applied to ``x``, brings it nearest to the reference; ``scaled_rel_rmse`` is the
+  error that is left then (the reference's noise taken off): the light's shape apart from its strength, of use for a
+  model without units.
 
-:func:`psnr` alone works on the final 8-bit picture, as a viewer sees it. Sums run in float64.
+:func:`picture_psnr` alone works on the final 8-bit picture, as a viewer sees it. Sums run in float64.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import math
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 Light = NDArray[np.floating[Any]]
+
+LUMINANCE = (0.2126, 0.7152, 0.0722)  # of linear Rec.709 primaries
+RELMSE_EPSILON = 0.01
+EDGE_CONTRAST = 0.2
+SSIM_WINDOW = 11
+_FLIP_STOPS = 6.0
+
+
+class MissingLibrary(ValueError):  # noqa: N818 - one line for the user, who can do without
+    """A metric whose library is not installed. The message says which, and how to get it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Target:
+    """What pictures are held against.
+
+    Attributes:
+        light: (H, W, 3), linear.
+        error: its standard error, (H, W, 3); None where it has no noise.
+        edges: (H, W) bool, pixels near an edge of a shadow; None where that is not known.
+    """
+
+    light: Light
+    error: Light | None = None
+    edges: NDArray[np.bool_] | None = None
+
+
+@dataclass(frozen=True)
+class Scores:
+    """A picture against a :class:`Target`: see the module for each figure.
+
+    None stands for a figure that does not exist: relative ones of a black reference, ``boundary`` without edges,
+    ``ssim`` of a picture smaller than its window, ``ssim`` and ``flip`` without their library (then ``missing`` says
+    so, a line each).
+
+    Attributes:
+        within_noise: the reference cannot tell the picture from right: the error that is left when the reference's
+            noise is taken off is no larger than that noise.
+    """
+
+    rmse: float
+    rel_rmse: float | None
+    rel_rmse_corrected: float | None
+    within_noise: bool
+    relmse: float | None
+    psnr: float | None
+    ssim: float | None
+    flip: float | None
+    bias: float | None
+    boundary: float | None
+    scaled_rel_rmse: float | None
+    best_scale: float
+    missing: tuple[str, ...] = ()
+
+    def to_json(self) -> dict[str, float | bool | None]:
+        """Every figure but ``missing``; JSON has no infinity, so the PSNR of equal pictures is null."""
+        values = {f.name: getattr(self, f.name) for f in dataclasses.fields(self) if f.name != "missing"}
+        return {name: _rounded(value) for name, value in values.items()}
+
+
+def score(image: Light, target: Target) -> Scores:
+    """All figures of the module at once.
+
+    Args:
+        image: (H, W, 3), linear.
+
+    Raises:
+        ValueError: the shapes differ, or a value is not finite.
+    """
+    r, error = target.light, target.error
+    plain, corrected, noise = rel_rmse(image, r), rel_rmse(image, r, error), relative_noise(r, error)
+    missing: list[str] = []
+
+    def optional(metric: Any) -> float | None:
+        try:
+            value: float | None = metric(image, r)
+        except MissingLibrary as reason:
+            missing.append(str(reason))
+            return None
+        return value
+
+    return Scores(
+        rmse=rmse(image, r),
+        rel_rmse=plain,
+        rel_rmse_corrected=corrected,
+        within_noise=corrected is not None and noise is not None and noise > 0 and corrected <= noise,
+        relmse=relmse(image, r),
+        psnr=psnr(image, r),
+        ssim=optional(ssim),
+        flip=optional(flip),
+        bias=bias(image, r),
+        boundary=boundary(image, target),
+        scaled_rel_rmse=scaled_rel_rmse(image, r, error),
+        best_scale=best_scale(image, r),
+        missing=tuple(missing),
+    )
+
+
+# --- error of the light -------------------------------------------------------------------------------------------
 
 
 def rmse(image: Light, reference: Light) -> float:
@@ -34,11 +151,29 @@ def rmse(image: Light, reference: Light) -> float:
     return math.sqrt(float(np.mean((x - r) ** 2)))
 
 
-def rel_rmse(image: Light, reference: Light) -> float | None:
-    """:func:`rmse` over the reference's mean; None where that mean is zero, since no relative error exists then."""
+def rel_rmse(image: Light, reference: Light, error: Light | None = None) -> float | None:
+    """:func:`rmse` over the reference's mean; None where that mean is zero, since no relative error exists then.
+
+    With the reference's standard ``error``, of the same shape, the expected square of its noise is taken off.
+    """
     x, r = _pair(image, reference)
     mean = float(r.mean())
-    return math.sqrt(float(np.mean((x - r) ** 2))) / mean if mean > 0 else None
+    return _without_noise(x - r, error) / mean if mean > 0 else None
+
+
+def relative_noise(reference: Light, error: Light | None) -> float | None:
+    """The reference's own relative standard error, ``sqrt(mean(se²)) / m``; 0 without noise, None without light."""
+    mean = float(np.mean(reference, dtype=np.float64))
+    if mean <= 0:
+        return None
+    return 0.0 if error is None else math.sqrt(float(np.mean(np.square(error, dtype=np.float64)))) / mean
+
+
+def relmse(image: Light, reference: Light) -> float | None:
+    """``mean((x − r)² / (r² + 0.01·m²))``; None where the reference is black."""
+    x, r = _pair(image, reference)
+    mean = float(r.mean())
+    return float(np.mean((x - r) ** 2 / (r**2 + RELMSE_EPSILON * mean**2))) if mean > 0 else None
 
 
 def bias(image: Light, reference: Light) -> float | None:
@@ -55,15 +190,32 @@ def best_scale(image: Light, reference: Light) -> float:
     return float(np.vdot(x, r)) / square if square > 0 else 0.0
 
 
-def scaled_rel_rmse(image: Light, reference: Light) -> float | None:
+def scaled_rel_rmse(image: Light, reference: Light, error: Light | None = None) -> float | None:
     """:func:`rel_rmse` after :func:`best_scale`: the error of the light's shape, whatever its strength."""
-    return rel_rmse(np.asarray(image, np.float64) * best_scale(image, reference), reference)
+    return rel_rmse(np.asarray(image, np.float64) * best_scale(image, reference), reference, error)
 
 
-def psnr(image: NDArray[np.uint8], reference: NDArray[np.uint8]) -> float:
+def peak(reference: Light) -> float:
+    """The light that counts as white: what 99.9 % of the values do not exceed, so that a few glints do not decide.
+
+    The greatest value where that is 0.
+    """
+    values = np.asarray(reference, np.float64)
+    return float(np.quantile(values, 0.999)) or float(values.max())
+
+
+def psnr(image: Light, reference: Light) -> float | None:
+    """Peak signal-to-noise ratio of linear light in dB; infinite where equal, None where the reference is black."""
+    error, white = rmse(image, reference), peak(reference)
+    if white <= 0:
+        return None
+    return 20 * math.log10(white / error) if error > 0 else math.inf
+
+
+def picture_psnr(image: NDArray[np.uint8], reference: NDArray[np.uint8]) -> float:
     """Peak signal-to-noise ratio of two 8-bit pictures in dB, ``20·log10(255 / rmse)``; infinite where equal."""
     if image.dtype != np.uint8 or reference.dtype != np.uint8:
-        raise ValueError(f"psnr compares 8-bit pictures, not {image.dtype} and {reference.dtype}")
+        raise ValueError(f"picture_psnr compares 8-bit pictures, not {image.dtype} and {reference.dtype}")
     x, r = _pair(image, reference)
     error = math.sqrt(float(np.mean((x - r) ** 2)))
     return 20 * math.log10(255 / error) if error > 0 else math.inf
@@ -80,6 +232,147 @@ def error_map(image: Light, reference: Light) -> NDArray[np.float32]:
     return (difference / mean if mean > 0 else np.zeros_like(difference)).astype(np.float32)
 
 
+# --- what people see ----------------------------------------------------------------------------------------------
+
+
+def ssim(image: Light, reference: Light) -> float | None:
+    """Mean structural similarity of (H, W, 3) linear light; 1 where equal.
+
+    None where a side is shorter than the window of 11 pixels, or the reference is black.
+
+    Raises:
+        MissingLibrary: scikit-image is not installed.
+    """
+    try:
+        from skimage.metrics import structural_similarity
+    except ImportError as error:
+        raise MissingLibrary(_missing("SSIM", "scikit-image")) from error
+    x, r = _pair(image, reference)
+    white = peak(r)
+    if min(r.shape[:2]) < SSIM_WINDOW or white <= 0:
+        return None
+    # The paper's own window and normalisation; scikit-image's defaults differ.
+    settings = {"gaussian_weights": True, "sigma": 1.5, "use_sample_covariance": False}
+    similarity: Any = structural_similarity
+    return float(similarity(r, x, data_range=white, channel_axis=-1, **settings))
+
+
+def flip(image: Light, reference: Light) -> float | None:
+    """Mean HDR-FLIP of (H, W, 3) linear light, 0 … 1; None where the reference is black, for it has no exposure.
+
+    Raises:
+        MissingLibrary: flip-evaluator is not installed.
+    """
+    try:
+        from flip_evaluator import evaluate
+    except ImportError as error:
+        raise MissingLibrary(_missing("FLIP", "flip-evaluator")) from error
+    x, r = _pair(image, reference)
+    exposures = flip_exposures(r)
+    if exposures is None:
+        return None
+    # FLIP is defined for light, which is not negative; a technique's rounding may be.
+    pictures = [np.ascontiguousarray(np.maximum(p, 0), np.float32) for p in (r, x)]
+    _, mean, _ = evaluate(*pictures, "HDR", applyMagma=False, parameters=exposures)
+    return float(mean)
+
+
+def flip_exposures(reference: Light) -> dict[str, float] | None:
+    """The range of exposures of HDR-FLIP, in the names of its library; None for a black reference.
+
+    As in its paper: from that which brings the brightest pixel's luminance to where the tone curve (ACES) reaches 0.85,
+    to that which does so for the median, a step a stop. The median is that of the pixels with any light, and no more
+    than 6 stops below the brightest: a black background would else ask for endless exposures.
+    """
+    luminance = np.maximum(np.asarray(reference, np.float64), 0) @ LUMINANCE
+    brightest = float(luminance.max())
+    if brightest <= 0:
+        return None
+    median = max(float(np.median(luminance[luminance > 0])), brightest * 2**-_FLIP_STOPS)
+    # Narkowicz's fit of ACES with 0.6 of the light: (a x² + b x) / (c x² + d x + e) = 0.85 at x = white.
+    a, b, c, d, e, level = 0.36 * 2.51, 0.6 * 0.03, 0.36 * 2.43, 0.6 * 0.59, 0.14, 0.85
+    square, half, last = a - level * c, -0.5 * (b - level * d), -level * e
+    white = half / square + math.sqrt((half / square) ** 2 - last / square)
+    start, stop = math.log2(white / brightest), math.log2(white / median)
+    return {"startExposure": start, "stopExposure": stop, "numExposures": max(2, math.ceil(stop - start))}
+
+
+# --- edges of shadows ---------------------------------------------------------------------------------------------
+
+
+def boundary(image: Light, target: Target) -> float | None:
+    """The relative RMSE over the pixels near an edge of a shadow; None where there are none, or the target is black.
+
+    With ``f`` the share of these pixels and ``e`` the same error over all others, ``rel_rmse² = f·boundary² +
+    (1 − f)·e²``.
+    """
+    x, r = _pair(image, target.light)
+    mean = float(r.mean())
+    if target.edges is None or not target.edges.any() or mean <= 0:
+        return None
+    error = None if target.error is None else target.error[target.edges]
+    return _without_noise((x - r)[target.edges], error) / mean
+
+
+def shadow_edges(lit: Light, unshadowed: Light, error: Light | None = None) -> NDArray[np.bool_]:
+    """Pixels near a visibility edge of a picture, (H, W).
+
+    The light ratio is the picture's luminance over that of the same view in which nothing casts a shadow: 1 where every
+    light reaches, whatever the surface's colour and the medium; 0 in full shadow. A pixel is near an edge where this
+    ratio, as a mean of 3×3 pixels, varies by 0.2 or more among the pixels within :func:`edge_reach` of it, and by six
+    times its standard error, so that noise makes no edges. A penumbra counts where it is about as narrow as that;
+    a silhouette between a lit and a shaded surface counts too.
+
+    Args:
+        lit: the picture, (H, W, 3) linear.
+        unshadowed: the same without shadows.
+        error: standard error of ``lit``.
+    """
+    picture, full = (np.asarray(p, np.float64) @ LUMINANCE for p in (lit, unshadowed))
+    usable = full > 1e-6 * max(float(full.mean()), 1e-300)
+    ratio = np.divide(picture, full, out=np.ones_like(full), where=usable)
+    reach = edge_reach(ratio.shape[0])
+    smooth = _mean3(np.minimum(ratio, 2))  # scattered many times, light may exceed the unshadowed
+    least = np.full_like(smooth, EDGE_CONTRAST)
+    if error is not None:
+        noise = np.asarray(error, np.float64) @ LUMINANCE  # of channels that err alike, which is the worst
+        noise = np.divide(noise, full, out=np.zeros_like(full), where=usable)
+        least = np.maximum(least, 6 * _extreme(np.sqrt(_mean3(noise**2) / 9), reach, np.max))
+    return np.asarray(_extreme(smooth, reach, np.max) - _extreme(smooth, reach, np.min) >= least)
+
+
+def edge_reach(height: int) -> int:
+    """How near an edge is near, in pixels: 1/180 of the picture's height, at least 1; the same part of any picture."""
+    return max(1, round(height / 180))
+
+
+def _mean3(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    padded = np.pad(values, 1, mode="edge")
+    rows = padded[:-2] + padded[1:-1] + padded[2:]
+    return np.asarray((rows[:, :-2] + rows[:, 1:-1] + rows[:, 2:]) / 9)
+
+
+def _extreme(values: NDArray[np.float64], reach: int, which: Any) -> NDArray[np.float64]:
+    """The greatest or the least value within a square around each pixel."""
+    for axis in (0, 1):
+        width = [(reach, reach) if a == axis else (0, 0) for a in (0, 1)]
+        padded = np.pad(values, width, mode="edge")
+        windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1, axis=axis)
+        values = which(windows, axis=-1)
+    return values
+
+
+# --- shared -------------------------------------------------------------------------------------------------------
+
+
+def _without_noise(difference: NDArray[np.float64], error: Light | None) -> float:
+    """Root of the mean square, less the expected square of the reference's noise."""
+    square = float(np.mean(difference**2))
+    if error is not None:
+        square -= float(np.mean(np.square(error, dtype=np.float64)))
+    return math.sqrt(max(0.0, square))
+
+
 def _pair(image: NDArray[Any], reference: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     if image.shape != reference.shape:
         raise ValueError(f"a picture of shape {image.shape} cannot be compared with one of {reference.shape}")
@@ -87,3 +380,13 @@ def _pair(image: NDArray[Any], reference: NDArray[Any]) -> tuple[NDArray[np.floa
     if not (np.isfinite(x).all() and np.isfinite(r).all()):
         raise ValueError("a picture with values that are not finite cannot be compared")
     return x, r
+
+
+def _missing(metric: str, package: str) -> str:
+    return f"{metric} is left out, as {package} is not installed: pip install 'tyndall[truth]'"
+
+
+def _rounded(value: float | bool | None) -> float | bool | None:
+    if value is None or isinstance(value, bool):
+        return value
+    return float(f"{value:.6g}") if math.isfinite(value) else None
