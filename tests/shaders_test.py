@@ -104,8 +104,8 @@ def test_every_module_is_imported_or_has_an_entry_point(gpu: Gpu) -> None:
     """No shader file lies about unused."""
     texts = {m: t for m, t in gpu.linker.modules.items() if not m.startswith("package::test_")}
     roots = {module for module, _ in entry_points(gpu)}
-    shadows = {cls.shader() for cls in FAMILIES["shadow"].members.values()}
-    for module in texts.keys() - roots - shadows:
+    overlaid = {cls.shader() for family in ("shadow", "occlusion") for cls in FAMILIES[family].members.values()}
+    for module in texts.keys() - roots - overlaid:
         users = [m for m, text in texts.items() if re.search(rf"import {module}\b", text)]
         assert users, f"{module} is imported nowhere"
 

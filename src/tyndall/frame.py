@@ -3,6 +3,7 @@
 ::
 
     content ──▶ G-buffer            content ──from each light──▶ shadows ──▶ visibility
+                                    content ──▶ occlusion of the ambient light
     G-buffer + lights + visibility ──▶ L_b ──▶ air: L_v, T ──▶ L_b·T + L_v ──▶ antialiasing ──▶ tone map ──▶ picture
 
 :meth:`Renderer.draw` is this diagram as code.
@@ -70,8 +71,8 @@ class Renderer(Closing):
         size: width and height in pixels.
         gpu: the device to draw on; the renderer makes its own, and closes it, when none is given.
         adapter: part of an adapter's name, for a device of its own.
-        volumetric, shadow, antialiasing, tonemap: techniques, by name or as instances; by name they start from the
-            scene's ``looks``.
+        volumetric, shadow, occlusion, antialiasing, tonemap: techniques, by name or as instances; by name they start
+            from the scene's ``looks``.
         seed: of everything random.
 
     Raises:
@@ -90,6 +91,7 @@ class Renderer(Closing):
         adapter: str | None = None,
         volumetric: str | Technique | None = None,
         shadow: str | Technique | None = None,
+        occlusion: str | Technique | None = None,
         antialiasing: str | Technique | None = None,
         tonemap: str | Technique | None = None,
         seed: int = 0,
@@ -101,7 +103,13 @@ class Renderer(Closing):
         if not 0 <= seed < 2**32:
             raise ParameterError(f"seed: {seed} is outside 0 … 4294967295")
         self.scene, self.size, self.seed = scene, size, seed
-        chosen = {"volumetric": volumetric, "shadow": shadow, "antialiasing": antialiasing, "tonemap": tonemap}
+        chosen = {
+            "volumetric": volumetric,
+            "shadow": shadow,
+            "occlusion": occlusion,
+            "antialiasing": antialiasing,
+            "tonemap": tonemap,
+        }
         techniques = {family: FAMILIES[family].make(name, scene.looks) for family, name in chosen.items()}
         self._own_gpu = gpu is None
         self.gpu = gpu or Gpu(adapter)
@@ -215,16 +223,22 @@ class Renderer(Closing):
                 content.draw_gbuffer(native, scope)
 
         shadow = self._view("shadow")
+        shadow.maps_wanted = self.technique("volumetric").reads_maps
         visibility = self.technique("shadow").render(shadow, self._content)
-        scope = {**scope, **visibility.bindings}
-        overlay = {"package::visibility": visibility.module}
+        occlusion = self.technique("occlusion").render(self._view("occlusion"))
+        scope = {**scope, **visibility.bindings, **occlusion.bindings}
+        overlay = {
+            "package::visibility": visibility.module,
+            "package::surface_visibility": visibility.surfaces,
+            "package::occlusion": occlusion.module,
+        }
 
         gpu.compute("lighting", _MODULE, "lighting").bind(scope, lit_out=images["base"].write()).overlay(
             overlay
         ).dispatch(*self.size)
 
         air = self._view("volumetric", scope, overlay)
-        air.images = {**images, "shadow_maps": visibility.maps}
+        air.images = {**images, **({"shadow_maps": visibility.maps} if visibility.maps else {})}
         self.technique("volumetric").render(air)
 
         gpu.compute("composite", _MODULE, "composite").bind(scope, lit_out=images["lit"].write()).overlay(

@@ -30,11 +30,13 @@ class Technique:
         name: as on the command line.
         paper: who described it, and when.
         advice: one honest line on when to use it.
+        reads_maps: whether it reads the shadow maps themselves, beyond asking for visibility.
     """
 
     name: ClassVar[str]
     paper: ClassVar[str]
     advice: ClassVar[str]
+    reads_maps: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         check(self)
@@ -60,6 +62,8 @@ class View:
         size: width and height of the picture in pixels.
         frame: frames drawn before this one.
         owner: "family.name": owner in the ledger and prefix of its passes.
+        maps_wanted: whether the volumetric technique reads shadow maps; what a shadow technique need not draw
+            otherwise.
     """
 
     gpu: Gpu
@@ -71,9 +75,11 @@ class View:
     scope: dict[str, Any] = field(default_factory=dict)
     overlay: dict[str, str] = field(default_factory=dict)
     frame: int = 0
+    maps_wanted: bool = False
     _resources: dict[str, Resource] = field(default_factory=dict)
     _descriptions: dict[str, Any] = field(default_factory=dict)
     _params: ParamsBuffer | None = None
+    _parts: dict[str, View] = field(default_factory=dict)
 
     @property
     def params(self) -> Bound:
@@ -121,15 +127,29 @@ class View:
         made = self.gpu.compute(f"{self.owner}.{entry}", self.technique.shader(), entry)
         return made.bind(self.scope, params=self.params).overlay(self.overlay)
 
+    def part(self, technique: Technique) -> View:
+        """The same frame as another technique sees it that this one makes use of; it lives as long as this view."""
+        made = self._parts.get(technique.name)
+        if made is None or made.technique != technique:
+            if made is not None:
+                made.close()
+                self.gpu.forget_groups()
+            made = View(self.gpu, self.scene, self.size, f"{self.owner}.{technique.name}", technique)
+            self._parts[technique.name] = made
+        made.images, made.scope, made.overlay, made.frame = self.images, self.scope, self.overlay, self.frame
+        return made
+
     def resources(self) -> list[Resource]:
         """What the technique holds on the device."""
-        return [*self._resources.values(), *([self._params] if self._params else [])]
+        own = [*self._resources.values(), *([self._params] if self._params else [])]
+        return own + [resource for part in self._parts.values() for resource in part.resources()]
 
     def close(self) -> None:
         """Free the technique's textures and uniforms."""
         for resource in self.resources():
             resource.destroy()
         self._resources.clear()
+        self._parts.clear()
         self._params = None
 
 
@@ -137,14 +157,33 @@ class View:
 class Visibility:
     """What a shadow technique provides to the frame.
 
-    Shadow maps come with every technique: what is exact only on surfaces leaves the air to them.
+    What is exact only on surfaces takes the module of the shadow map for the air.
 
     Attributes:
-        module: a WESL module with ``fn visibility(light: u32, position: vec3f, normal: vec3f) -> f32``.
-        bindings: what that module imports from ``package::bindings``.
-        maps: the shadow maps, a depth layer per map (reversed-Z; 0 where nothing was drawn).
+        module: a WESL module with ``fn visibility(light: u32, position: vec3f, normal: vec3f) -> f32``, for any point;
+            the normal is zero in the air.
+        surfaces: a WESL module with ``fn surface_visibility(light: u32, pixel: vec2u, position: vec3f, normal: vec3f)
+            -> f32``, for what a pixel shows.
+        bindings: what these modules import from ``package::bindings``.
+        maps: the shadow maps, a depth layer per map (reversed-Z; 0 where nothing was drawn); None only where none are
+            wanted.
     """
 
     module: str
+    surfaces: str
     bindings: Mapping[str, Any]
-    maps: Texture
+    maps: Texture | None = None
+
+
+@dataclass(frozen=True)
+class Occlusion:
+    """What an occlusion technique provides to the frame.
+
+    Attributes:
+        module: a WESL module with ``fn ambient_visibility(pixel: vec2u) -> f32``, the part of the ambient light, by
+            the cosine, that reaches what a pixel shows.
+        bindings: what that module imports from ``package::bindings``.
+    """
+
+    module: str
+    bindings: Mapping[str, Any] = field(default_factory=dict)

@@ -62,6 +62,7 @@ class ShadowMap(Technique):
                     kind.draw_depth(native, scope, self.cull)
         return Visibility(
             self.shader(),
+            self.shader(),
             {
                 "shadow_layers": table,
                 "shadow_maps": maps,

@@ -1,0 +1,6 @@
+"""Occlusion techniques: how much of the ambient light reaches a surface."""
+
+from tyndall.techniques.contract import Technique
+from tyndall.techniques.occlusion.none import NoOcclusion
+
+MEMBERS: tuple[type[Technique], ...] = (NoOcclusion,)
