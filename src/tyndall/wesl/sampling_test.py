@@ -6,7 +6,9 @@ import numpy as np
 import props
 import pytest
 
+from tyndall.frame import pack_medium
 from tyndall.gpu.device import Gpu
+from tyndall.scene.model import Gibbons, HenyeyGreenstein, Isotropic, Medium, Phase, Rayleigh, Schlick
 
 SEQUENCE = """
     import package::wesl::sampling::{sequence_1d, sequence_2d};
@@ -146,6 +148,27 @@ def test_henyey_greenstein_is_sampled_exactly(gpu: Gpu, g: float) -> None:
         assert_uniform(below)
     else:
         assert_uniform(0.5 + 0.5 * cosine)
+
+
+@pytest.mark.parametrize(
+    "model", [Isotropic(), HenyeyGreenstein(0.6), Rayleigh(), Gibbons(), Schlick(0.0), Schlick(-0.8)]
+)
+def test_every_phase_function_is_sampled_exactly(gpu: Gpu, model: Phase) -> None:
+    """The cumulative distribution of the samples is that of the phase function, by quadrature."""
+    text = """
+        import package::wesl::sampling::sample_phase;
+        fn evaluate(x: vec4f) -> vec4f {
+            return vec4f(sample_phase(u32(x.y), x.z, x.x));
+        }
+    """
+    row = pack_medium(Medium(phase=model), gpu.dtype("package::wesl::medium::Medium"))
+    u = (np.arange(COUNT) + 0.5) / COUNT
+    rows = np.stack([u, np.full(COUNT, row["phase_kind"]), np.full(COUNT, row["phase_parameter"]), u], axis=1)
+    cosine = props.evaluate(gpu, f"test_phase_samples_{model.kind}_{row['phase_parameter'] < 0}", text, rows)[:, 0]
+    edges = np.linspace(-1, 1, 20_001)
+    middle = (edges[1:] + edges[:-1]) / 2
+    below = np.concatenate([[0], np.cumsum(2 * np.pi * props.phase(model, middle) * np.diff(edges))])
+    assert_uniform(np.interp(cosine.astype(float), edges, below))
 
 
 @pytest.mark.parametrize("alpha", [0.05, 0.6])
