@@ -72,7 +72,7 @@ class Stage(Closing):
 
     Args:
         adapter: part of an adapter's name, or a device to share; a shared one is left open.
-        shadow, antialiasing, tonemap: techniques by name, ready made, or None for the family's default.
+        shadow, occlusion, antialiasing, tonemap: techniques by name, ready made, or None for the family's default.
 
     Raises:
         GpuError: no such adapter, or a size beyond its limits.
@@ -85,6 +85,7 @@ class Stage(Closing):
         size: tuple[int, int],
         *,
         shadow: str | Technique | None = None,
+        occlusion: str | Technique | None = None,
         antialiasing: str | Technique | None = None,
         tonemap: str | Technique | None = None,
         parameters: Overrides | None = None,
@@ -97,6 +98,7 @@ class Stage(Closing):
                 raise ParameterError(f"parameters: no technique '{name}'{nearest(name, known)}")
         self.scene, self.size, self.seed = scene, size, seed
         self.shadow = make("shadow", shadow, scene, parameters)
+        self.occlusion = make("occlusion", occlusion, scene, parameters)
         self.antialiasing = make("antialiasing", antialiasing, scene, parameters)
         self.tonemap = make("tonemap", tonemap, scene, parameters)
         self._owned = not isinstance(adapter, Gpu)
@@ -108,6 +110,7 @@ class Stage(Closing):
                 gpu=self.gpu,
                 volumetric="off",
                 shadow=self.shadow,
+                occlusion=self.occlusion,
                 antialiasing=self.antialiasing,
                 tonemap=self.tonemap,
                 seed=seed,
@@ -150,6 +153,7 @@ class Stage(Closing):
             self.scene,
             size,
             shadow=self.shadow,
+            occlusion=self.occlusion,
             antialiasing=self.antialiasing,
             tonemap=self.tonemap,
             adapter=self.gpu,
