@@ -34,7 +34,7 @@ DEPTH_FORMAT = "depth32float"
 
 _POSITION = (12, ((0, "float32x3", 0),))
 _ATTRIBUTES = (16, ((1, "snorm16x4", 0), (2, "float32x2", 8)))
-_MAPS = ("base_color", "metallic_roughness", "normal", "emissive")
+MAPS = ("base_color", "metallic_roughness", "normal", "emissive")
 _ADDRESS = {"repeat": "repeat", "clamp": "clamp-to-edge", "mirror": "mirror-repeat"}
 
 _GBUFFER = Raster(targets=GBUFFER_TARGETS, depth=DEPTH_FORMAT, vertex_buffers=(_POSITION, _ATTRIBUTES))
@@ -54,7 +54,15 @@ class _Draw:
 
 
 class Meshes:
-    """The meshes of a scene on the device."""
+    """The meshes of a scene on the device.
+
+    Attributes:
+        positions, attributes, indices: the streams of all meshes.
+        materials: ``MaterialData`` of each material.
+        placed: by a mesh's ``id``, its first index and first vertex in the streams.
+        material_of: by a mesh's ``id``, its material's row.
+        material_list: the materials in the order of their rows.
+    """
 
     def __init__(self, gpu: Gpu, scene: Scene) -> None:
         self._gpu = gpu
@@ -64,8 +72,7 @@ class Meshes:
         self._draws: list[_Draw] = []
         self._maps: dict[int, dict[str, Bound]] = {}
         try:
-            if scene.instances:
-                self._upload(scene)
+            self._upload(scene)
         except BaseException:
             self.close()
             raise
@@ -89,24 +96,26 @@ class Meshes:
         for mesh in meshes.values():
             materials.setdefault(id(mesh.material), mesh.material)
         material_index = {key: i for i, key in enumerate(materials)}
+        self.material_list = list(materials.values())
+        self.material_of = {key: material_index[id(mesh.material)] for key, mesh in meshes.items()}
 
         vertex_total = sum(len(m.positions) for m in meshes.values())
         index_total = sum(m.indices.size for m in meshes.values())
-        self._positions = self._buffer("positions", 12 * vertex_total, usage="vertex")
-        self._attributes = self._buffer("attributes", 16 * vertex_total, usage="vertex")
-        self._indices = self._buffer("indices", 4 * index_total, usage="index")
-        placed: dict[int, tuple[int, int]] = {}
+        self.positions = self._buffer("positions", 12 * vertex_total, usage="vertex storage")
+        self.attributes = self._buffer("attributes", 16 * vertex_total, usage="vertex storage")
+        self.indices = self._buffer("indices", 4 * index_total, usage="index storage")
+        self.placed: dict[int, tuple[int, int]] = {}
         vertex = index = 0
         for key, mesh in meshes.items():
-            gpu.write(self._positions, mesh.positions, 12 * vertex)
-            gpu.write(self._attributes, _attributes(mesh), 16 * vertex)
-            gpu.write(self._indices, mesh.indices, 4 * index)
-            placed[key] = (index, vertex)
+            gpu.write(self.positions, mesh.positions, 12 * vertex)
+            gpu.write(self.attributes, _attributes(mesh), 16 * vertex)
+            gpu.write(self.indices, mesh.indices, 4 * index)
+            self.placed[key] = (index, vertex)
             vertex += len(mesh.positions)
             index += mesh.indices.size
 
         count = len(scene.instances)
-        rows = np.zeros(count, gpu.dtype(f"{MODULE}::InstanceData"))
+        rows = np.zeros(max(1, count), gpu.dtype(f"{MODULE}::InstanceData"))
         first = 0
         for (key, mirrored), matrices in groups.items():
             mesh = meshes[key]
@@ -114,31 +123,32 @@ class Meshes:
             world = np.stack(matrices)
             rows["world"][first:stop] = world.transpose(0, 2, 1)
             rows["normal"][first:stop, :, :3] = _normal_columns(world[:, :3, :3])
-            rows["material"][first:stop] = material_index[id(mesh.material)]
+            rows["material"][first:stop] = self.material_of[key]
+            first_index, first_vertex = self.placed[key]
             self._draws.append(
-                _Draw(mesh.material, mirrored, placed[key][0], mesh.indices.size, placed[key][1], first, len(matrices))
+                _Draw(mesh.material, mirrored, first_index, mesh.indices.size, first_vertex, first, len(matrices))
             )
             first = stop
         self._instances = self._buffer("instances", rows, element=f"{MODULE}::InstanceData")
-        self._materials = self._buffer(
-            "materials", self._pack_materials(list(materials.values())), element=f"{MODULE}::MaterialData"
+        self.materials = self._buffer(
+            "materials", self._pack_materials(self.material_list), element=f"{MODULE}::MaterialData"
         )
         self._maps = {key: self._bind_maps(material) for key, material in materials.items()}
 
     def _pack_materials(self, materials: list[Material]) -> NDArray[Any]:
-        rows = np.zeros(len(materials), self._gpu.dtype(f"{MODULE}::MaterialData"))
-        for row, m in zip(rows, materials, strict=True):
+        rows = np.zeros(max(1, len(materials)), self._gpu.dtype(f"{MODULE}::MaterialData"))
+        for row, m in zip(rows, materials, strict=False):
             row["base_color"], row["emissive"] = m.base_color, m.emissive
             row["metallic"], row["roughness"] = m.metallic, m.roughness
             row["alpha_cutoff"] = m.alpha_cutoff if m.alpha_mode == "mask" else 0.0
-            for name in _MAPS:
+            for name in MAPS:
                 row[f"{name}_uv"] = _uv_columns(getattr(m, f"{name}_texture"))
         return rows
 
     def _bind_maps(self, material: Material) -> dict[str, Bound]:
         gpu = self._gpu
         bound: dict[str, Bound] = {}
-        for name in _MAPS:
+        for name in MAPS:
             texture: SceneTexture | None = getattr(material, f"{name}_texture")
             srgb = name in ("base_color", "emissive")
             bound[f"{name}_map"] = self._texture(texture, srgb).sampled()
@@ -193,9 +203,9 @@ class Meshes:
         gpu = self._gpu
         base = _GBUFFER if kind == "gbuffer" else _SOLID_DEPTH
         bundle = gpu.bundle(f"mesh.{kind}", base)
-        bundle.set_index_buffer(self._indices.native, "uint32")
-        bundle.set_vertex_buffer(0, self._positions.native)
-        bundle.set_vertex_buffer(1, self._attributes.native)
+        bundle.set_index_buffer(self.indices.native, "uint32")
+        bundle.set_vertex_buffer(0, self.positions.native)
+        bundle.set_vertex_buffer(1, self.attributes.native)
         current: Any = None
         for draw in self._draws:
             masked = draw.material.alpha_mode == "mask"
@@ -205,7 +215,7 @@ class Meshes:
             bindings = {
                 **scope,
                 "instances": self._instances,
-                "materials": self._materials,
+                "materials": self.materials,
                 **self._maps[id(draw.material)],
             }
             if kind == "gbuffer":
@@ -251,7 +261,7 @@ class Meshes:
 def _features(material: Material) -> dict[str, bool]:
     """What a material's shader must do: a fragment of a plain one is several times as cheap."""
     return {
-        **{f"has_{name}": getattr(material, f"{name}_texture") is not None for name in _MAPS},
+        **{f"has_{name}": getattr(material, f"{name}_texture") is not None for name in MAPS},
         "is_masked": material.alpha_mode == "mask",
     }
 
@@ -274,6 +284,11 @@ def _normal_columns(world: NDArray[np.float64]) -> NDArray[np.float64]:
     sign = np.where(np.linalg.det(world) < 0, -1.0, 1.0)[:, None, None]
     scaled: NDArray[np.float64] = sign * cofactors / np.where(largest > 0, largest, 1.0)
     return scaled
+
+
+def normal_rows(linear: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(3, 3): the matrix that takes normals with it where ``linear`` takes positions, to a scale."""
+    return _normal_columns(linear[None])[0].T
 
 
 def _uv_columns(texture: SceneTexture | None) -> NDArray[np.float64]:

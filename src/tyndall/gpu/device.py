@@ -18,7 +18,7 @@ import logging
 import os
 import sys
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -34,6 +34,7 @@ from tyndall.gpu.resources import (
     Closing,
     Ledger,
     ParamsBuffer,
+    Parts,
     Resource,
     Sampler,
     Slot,
@@ -65,6 +66,7 @@ _RANK_TYPE = {"DiscreteGPU": 0, "IntegratedGPU": 1, "VirtualGPU": 2, "Unknown": 
 _BACKENDS = ("Vulkan", "Metal", "D3D12")
 _MAX_TIMED_PASSES = 2048
 _UPLOAD_CHUNK = 64 << 20
+LINE = 32_768  # workgroups in a row of a one-dimensional dispatch
 
 
 class GpuError(RuntimeError):
@@ -182,6 +184,7 @@ class Gpu(Closing):
         self.features = frozenset(features)
         self.limits: Mapping[str, int] = {**native.limits, **limits}
         self.ledger = Ledger()
+        self.part_bytes: int = self.limits["max-storage-buffer-binding-size"]
         self.linker = Linker.of_package()
         self._programs: dict[Any, _Program] = {}
         self._modules: dict[Any, tuple[Linked, Any]] = {}
@@ -308,7 +311,7 @@ class Gpu(Closing):
         except wgpu.GPUError as error:
             raise GpuError(f"{label}: {size} bytes: {_cause(error)}") from None
         result = Buffer(self.ledger, owner, label, size, native)
-        result.element = element
+        result.element, result.part_bytes = element, self.part_bytes
         if "::" in element:
             result.dtype = self.linker.dtype(element)
         if not isinstance(data, int):
@@ -631,9 +634,16 @@ class ComputePass:
         self._features: Mapping[str, bool] = {}
 
     def bind(self, scope: Mapping[str, Any] | None = None, **resources: Any) -> Self:
-        """Give names to resources: a :class:`Bound`, or a texture (sampled), buffer (read) or parameter buffer."""
+        """Give names to resources: a :class:`Bound`, :class:`Parts`, or a texture (sampled), buffer (read) or
+        parameter buffer.
+        """
         for name, value in {**(scope or {}), **resources}.items():
-            self._bound[name] = value if type(value) is Bound else _as_bound(value)
+            if type(value) is Bound:
+                self._bound[name] = value
+            elif isinstance(value, Parts):
+                self._bound.update(value.named(name))
+            else:
+                self._bound[name] = _as_bound(value)
         return self
 
     def overlay(self, modules: Mapping[str, str]) -> Self:
@@ -648,16 +658,31 @@ class ComputePass:
 
     def dispatch(self, width: int, height: int = 1, depth: int = 1) -> None:
         """Run one thread for each element of the given size (rounded up to whole workgroups; the shader checks)."""
+        x, y, z = self._gpu.linker.workgroup(self._module, self._entry)
+        self._encode(lambda native: native.dispatch_workgroups(-(-width // x), -(-height // y), -(-depth // z)))
+
+    def dispatch_line(self, count: int) -> None:
+        """Run one thread for each of ``count`` elements, in rows of :data:`LINE` workgroups: the limit of one dimension
+        is 65,535. The shader's index is ``(workgroup.y · LINE + workgroup.x) · size + local``.
+        """
+        groups = -(-count // self._gpu.linker.workgroup(self._module, self._entry)[0])
+        rows = max(1, -(-groups // LINE))
+        self._encode(lambda native: native.dispatch_workgroups(LINE if rows > 1 else max(1, groups), rows))
+
+    def dispatch_indirect(self, arguments: Buffer, offset: int = 0) -> None:
+        """Run as many workgroups as three ``u32`` of a buffer say, at a byte offset."""
+        self._encode(lambda native: native.dispatch_workgroups_indirect(arguments.native, offset))
+
+    def _encode(self, dispatch: Callable[[Any], object]) -> None:
         gpu = self._gpu
         program = gpu._program(self._module, (self._entry,), self._bound, self._overlay, self._features, None)
         group = gpu._group(program, self._bound)
-        x, y, z = gpu.linker.workgroup(self._module, self._entry)
         encoder = gpu.encoder
         stamps = gpu.timestamps(self._label)
         native = encoder.begin_compute_pass(label=self._label, **({"timestamp_writes": stamps} if stamps else {}))
         native.set_pipeline(program.pipeline)
         native.set_bind_group(0, group)
-        native.dispatch_workgroups(-(-width // x), -(-height // y), -(-depth // z))
+        dispatch(native)
         native.end()
 
 
@@ -681,7 +706,12 @@ def _bindings_module(names: Sequence[str], slots: Sequence[Slot]) -> str:
         f"@group(0) @binding({i}) {slot.declaration.format(name=name)}"
         for i, (name, slot) in enumerate(zip(names, slots, strict=True))
     ]
-    return "\n".join([*imports, *structs, *lines, ""])
+    accessors = [
+        slot.accessors.replace("NAME", name.rpartition("_")[0])
+        for name, slot in zip(names, slots, strict=True)
+        if slot.accessors
+    ]
+    return "\n".join([*imports, *structs, *lines, *accessors, ""])
 
 
 def _raster_descriptor(label: str, layout: Any, module: Any, entries: tuple[str, ...], state: Raster) -> dict[str, Any]:

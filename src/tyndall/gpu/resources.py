@@ -30,6 +30,7 @@ BYTES_PER_TEXEL = {
     "rg32float": 8,
     "rgba32float": 16,
     "r32uint": 4,
+    "rg32uint": 8,
     "rgba32uint": 16,
     "depth32float": 4,
 }
@@ -44,6 +45,7 @@ _NUMPY = {
     "rg32float": (np.float32, 2),
     "rgba32float": (np.float32, 4),
     "r32uint": (np.uint32, 1),
+    "rg32uint": (np.uint32, 2),
     "rgba32uint": (np.uint32, 4),
     "depth32float": (np.float32, 1),
 }
@@ -56,12 +58,15 @@ def texel_dtype(format: str) -> tuple[Any, int]:
 
 @dataclass(frozen=True)
 class Slot:
-    """How a shader sees a resource: a declaration of ``{name}``, and the struct or import that it needs before it."""
+    """How a shader sees a resource: a declaration of ``{name}``, the struct or import that it needs before it, and the
+    functions that read and write a resource of several bindings (:class:`Parts`).
+    """
 
     declaration: str
     layout: tuple[tuple[str, Any], ...]
     visibility: int
     preamble: str = ""
+    accessors: str = ""
 
     def entry(self, binding: int) -> dict[str, Any]:
         (kind, items) = self.layout[0]
@@ -80,6 +85,20 @@ class Bound:
 
     def __init__(self, slot: Slot, native: Any) -> None:
         self.slot, self.native, self.key = slot, native, next(_serial)
+
+
+@dataclass(frozen=True)
+class Parts:
+    """A buffer as several bindings, since one holds no more than the adapter's limit (128 MiB on a software one).
+
+    Bound as ``name``, a shader imports ``name_at(index)`` and, where it may write, ``name_put(index, value)``.
+    """
+
+    bounds: tuple[Bound, ...]
+
+    def named(self, name: str) -> dict[str, Bound]:
+        """The bindings, by the names that the functions use."""
+        return {f"{name}_{i}": bound for i, bound in enumerate(self.bounds)}
 
 
 class Ledger:
@@ -127,13 +146,14 @@ class Closing:
         self.close()
 
 
-class Resource:
+class Resource(Closing):
     """Something in the ledger that can be destroyed once."""
 
     def __init__(self, ledger: Ledger, owner: str, label: str, size: int, native: Any) -> None:
         self.owner, self.label, self.size_bytes, self.native = owner, label, size, native
         self._ledger, self._serial = ledger, next(_serial)
         self._bounds: dict[str, Bound] = {}
+        self._parts: dict[str, Parts] = {}
         ledger.add(self._serial, owner, label, size)
 
     def destroy(self) -> None:
@@ -142,6 +162,10 @@ class Resource:
             self.native.destroy()
             self._ledger.remove(self._serial)
             self.native = None
+
+    def close(self) -> None:
+        """As :meth:`destroy`."""
+        self.destroy()
 
 
 class Buffer(Resource):
@@ -154,6 +178,42 @@ class Buffer(Resource):
 
     element: str = "u32"
     dtype: np.dtype[Any] = np.dtype("<u4")
+    part_bytes: int = 128 << 20
+
+    def split(self, element: str | None = None, *, write: bool = False) -> Parts:
+        """As however many storage bindings its size takes, read through ``name_at``; written too, in compute only.
+
+        Args:
+            element: WESL type to see it as, if not its own; one of the scalars and vectors below.
+        """
+        kind = f"split {element} {write}"
+        if kind not in self._parts:
+            self._parts[kind] = self._split(element, write)
+        return self._parts[kind]
+
+    def _split(self, element: str | None, write: bool) -> Parts:
+        if element is None and "::" in self.element:
+            (name, preamble), stride = self._named(), self.dtype.itemsize
+        else:
+            name, preamble = element or self.element, ""
+            stride = _STRIDES[name]
+        shift = (self.part_bytes // stride).bit_length() - 1  # elements of a part: a power of two
+        count = max(1, -(-self.size_bytes // (stride << shift)))
+        access = "read_write" if write else "read"
+        layout = (("buffer", (("type", "storage" if write else "read-only-storage"),)),)
+        bounds = []
+        for i in range(count):
+            start = i * (stride << shift)
+            slot = Slot(
+                f"var<storage, {access}> {{name}}: array<{name}>;",
+                layout,
+                _COMPUTE if write else _ALL,
+                preamble,
+                _accessors(name, count, shift, write) if i == 0 else "",
+            )
+            size = min(self.size_bytes - start, stride << shift)
+            bounds.append(Bound(slot, {"buffer": self.native, "offset": start, "size": size}))
+        return Parts(tuple(bounds))
 
     def _named(self) -> tuple[str, str]:
         if "::" in self.element:
@@ -178,6 +238,27 @@ class Buffer(Resource):
             slot = Slot(declaration.replace("ELEMENT", name), (("buffer", (("type", kind),)),), visibility, preamble)
             self._bounds[kind] = Bound(slot, {"buffer": self.native, "offset": 0, "size": size})
         return self._bounds[kind]
+
+
+_STRIDES = {"u32": 4, "i32": 4, "f32": 4, "vec2u": 8, "vec2f": 8, "vec4u": 16, "vec4f": 16}
+
+
+def _accessors(element: str, count: int, shift: int, write: bool) -> str:
+    """WESL functions over the parts of a buffer; NAME stands for what it is bound as."""
+
+    def cases(statement: str) -> str:
+        if count == 1:
+            return statement.format(part=0, index="i")
+        mask = (1 << shift) - 1
+        body = "".join(
+            f"{f'case {part}u' if part < count - 1 else 'default'}: {{ {statement.format(part=part, index='k')} }} "
+            for part in range(count)
+        )
+        return f"let k = i & {mask}u; switch i >> {shift}u {{ {body}}}"
+
+    read = f"fn NAME_at(i: u32) -> {element} {{ {cases('return NAME_{part}[{index}];')} }}"
+    put = f"fn NAME_put(i: u32, value: {element}) {{ {cases('NAME_{part}[{index}] = value;')} }}"
+    return f"{read}\n{put}" if write else read
 
 
 class ParamsBuffer(Resource):

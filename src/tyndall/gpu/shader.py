@@ -26,7 +26,9 @@ import wgpu
 
 _BINDINGS = "package::bindings"
 _USED = re.compile(r"@group\(0\)\s*@binding\((\d+)\)")
-_VIRTUAL_IMPORT = re.compile(r"import\s+(package::(?:bindings|visibility|surface_visibility|occlusion))::(\{[^}]*\}|\w+)\s*;")
+_VIRTUAL_IMPORT = re.compile(
+    r"import\s+(package::(?:bindings|visibility|surface_visibility|occlusion))::(\{[^}]*\}|\w+)\s*;"
+)
 _ATTRIBUTE = re.compile(r"@\w+(?:\([^)]*\))?\s*")
 _DECLARATION = re.compile(r"(?:fn|struct|const|override|var(?:<[^>]*>)?)\s+(\w+)")
 # Line numbers of the driver's report. A fault of grammar has its place in the heading, "┌─ wgsl:4:5"; a fault of

@@ -1,0 +1,249 @@
+"""A scene that rays can hit: its tree, its triangles, and what a hit needs to know of their materials.
+
+Shaders see it through ``tracing/rays.wesl`` (``occluded``, ``closest``) and ``tracing/surface.wesl`` (``surface_at``),
+with :attr:`World.bindings` in their scope. Vertex attributes, indices and materials are the buffers that
+:mod:`tyndall.content.mesh` draws from; texels lie in a buffer of their own, since a shader cannot choose between
+textures. :mod:`tyndall.tracing.layout` says what is built in which space, :mod:`tyndall.tracing.bvh` how.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tyndall.content.mesh import MAPS, Meshes
+from tyndall.gpu.device import Gpu, GpuError
+from tyndall.gpu.params import ParameterError
+from tyndall.gpu.resources import Buffer, Closing, Parts, Resource
+from tyndall.scene.model import Mat4, Scene, Texture
+from tyndall.tracing.bvh import OWNER, STACK, Clustering, Steps
+from tyndall.tracing.layout import arrange, is_flat, place
+
+_RAYS = "package::tracing::rays"
+_MASKED = "package::tracing::masked"
+_BUILD = "package::tracing::build"
+_NOTHING = 0xFFFFFFFF
+_MAX_LEAVES = 1 << 30  # a reference has two bits for other things
+_WRAP = {"repeat": 0, "clamp": 1, "mirror": 2}
+
+
+class World(Closing):
+    """The geometry of a scene, for rays.
+
+    Args:
+        meshes: the scene's meshes where they are on the device already; the world makes its own otherwise.
+        movable: every instance keeps a space of its own, so that :meth:`move` needs no new build; rays then cross more
+            boxes. (What has several instances can be moved in any case.)
+
+    Attributes:
+        bindings: what shaders that trace rays must have in their scope.
+        depth: of the deepest branch, in nodes.
+
+    Raises:
+        GpuError: more triangles than can be numbered, or than fit the device.
+    """
+
+    def __init__(self, gpu: Gpu, scene: Scene, *, meshes: Meshes | None = None, movable: bool = False) -> None:
+        self._gpu = gpu
+        self._own_meshes = meshes is None
+        self._meshes = meshes or Meshes(gpu, scene)
+        self._buffers: list[Buffer] = []
+        try:
+            dtypes = {
+                name: gpu.dtype(f"{module}::{name}")
+                for module, name in ((_BUILD, "Part"), (_RAYS, "Placed"), (_BUILD, "Box"))
+            }
+            self._layout = arrange(scene, self._meshes.placed, dtypes, movable=movable)
+            self._upload()
+            self.build()
+        except BaseException:
+            self.close()
+            raise
+
+    def _buffer(self, label: str, data: NDArray[Any] | int, element: str = "u32") -> Buffer:
+        buffer = self._gpu.buffer(f"tracing.{label}", data, owner=OWNER, element=element)
+        self._buffers.append(buffer)
+        return buffer
+
+    def _upload(self) -> None:
+        gpu, layout, meshes = self._gpu, self._layout, self._meshes
+        if layout.leaves > _MAX_LEAVES:
+            raise GpuError(f"tracing: {layout.leaves:,} triangles; {_MAX_LEAVES:,} can be numbered")
+        self._root = self._buffer("root", np.full(4, _NOTHING, np.uint32))
+        self._instances = self._buffer("instances", layout.instances, f"{_RAYS}::Placed")
+        self._nodes = self._buffer("nodes", 64 * (layout.leaves + len(layout.instances)), f"{_RAYS}::Node")
+        self._triangles = self._buffer("triangles", 48 * max(1, layout.leaves), f"{_RAYS}::Triangle")
+        self._roots = self._buffer("roots", np.full(len(layout.boxes), _NOTHING, np.uint32))
+        self._boxes = self._buffer("boxes", layout.boxes, f"{_BUILD}::Box")
+        rows = np.zeros(max(1, len(meshes.placed)), gpu.dtype(f"{_MASKED}::TracedMesh"))
+        for row, (mesh, (_, vertex)) in zip(rows, meshes.placed.items(), strict=False):
+            row["first_vertex"], row["material"] = vertex, meshes.material_of[mesh]
+        maps, texels = self._textures()
+        self.bindings: dict[str, Any] = {
+            "trace_root": self._root.read(),
+            "trace_nodes": self._nodes.split(),
+            "trace_triangles": self._triangles.split(),
+            "trace_instances": self._instances.split(),
+            "trace_meshes": self._buffer("meshes", rows, f"{_MASKED}::TracedMesh").read(),
+            "trace_maps": maps.read(),
+            "trace_texels": texels.split(),
+            "trace_corners": meshes.indices.split("u32"),
+            "trace_vertices": meshes.attributes.split("vec4u"),
+            "trace_materials": meshes.materials.read(),
+        }
+
+    def _textures(self) -> tuple[Buffer, Buffer]:
+        """The materials' textures: where each lies, and the texels of all."""
+        materials = self._meshes.material_list
+        rows = np.zeros(len(MAPS) * max(1, len(materials)), self._gpu.dtype(f"{_MASKED}::Map"))
+        images: dict[int, tuple[int, NDArray[np.uint8]]] = {}
+        texels = 0
+        for i, material in enumerate(materials):
+            for j, name in enumerate(MAPS):
+                texture: Texture | None = getattr(material, f"{name}_texture")
+                if texture is None:
+                    continue
+                pixels = texture.image.pixels
+                if id(texture.image) not in images:
+                    images[id(texture.image)] = (texels, pixels)
+                    texels += pixels.shape[0] * pixels.shape[1]
+                wrap = _WRAP[texture.wrap_u] | _WRAP[texture.wrap_v] << 2 | (texture.filter == "nearest") << 4
+                wrap |= (name in ("base_color", "emissive")) << 5
+                row = rows[len(MAPS) * i + j]
+                row["first"] = images[id(texture.image)][0]
+                row["height"], row["width"] = pixels.shape[:2]
+                row["wrap"] = wrap
+        packed = self._buffer("texels", 4 * max(1, texels))
+        for first, pixels in images.values():
+            self._gpu.write(packed, pixels, 4 * first)
+        return self._buffer("maps", rows, f"{_MASKED}::Map"), packed
+
+    # --- building -------------------------------------------------------------------------------------------------
+
+    def build(self) -> None:
+        """Make the whole tree anew, on the device."""
+        gpu, layout, meshes = self._gpu, self._layout, self._meshes
+        self._upper: Steps | None = None
+        self.depth = 0
+        if not layout.leaves:
+            return
+        parts = self._buffer("parts", layout.parts, f"{_BUILD}::Part")
+        scope = {
+            **self.bindings,
+            "parts": parts.read(),
+            "part_count": gpu.constant(len(layout.parts)),
+            "group_boxes": self._boxes.read(),
+            "trace_positions": meshes.positions.split("f32"),
+        }
+        lower = self._cluster(layout.leaves, layout.groups, 0, "triangle", scope, self._finish_groups)
+        hanging = self._buffer("hanging", layout.hanging)
+        self._scope = {
+            **self.bindings,
+            "group_boxes": self._buffer("box", layout.box, f"{_BUILD}::Box").read(),
+            "hanging": hanging.read(),
+            "instances": self._instances.read_write(),
+            "roots": self._roots.read(),
+            "root_boxes": self._boxes.read(),
+        }
+        first = layout.leaves - layout.groups
+        self._upper = self._cluster(len(layout.hanging), 1, first, "instance", self._scope, self._finish_top)
+        self.depth = lower.depth + self._upper.depth
+
+    def _cluster(
+        self,
+        leaves: int,
+        groups: int,
+        first: int,
+        kind: str,
+        scope: Mapping[str, Any],
+        finish: Callable[[Parts], object],
+    ) -> Steps:
+        with Clustering(self._gpu, self._nodes, leaves=leaves, groups=groups, first_node=first) as clustering:
+            clustering.sort(f"{kind}_keys", scope)
+            scope = {**scope, "trace_triangles": self._triangles.split(write=True)} if kind == "triangle" else scope
+            clusters, steps = clustering.cluster(f"{kind}_leaves", scope)
+            if steps.depth > STACK // 2:
+                clusters, steps = clustering.cluster(f"{kind}_leaves", scope, paired=True)
+            finish(clusters)
+            self._gpu.submit()
+        return steps
+
+    def _finish_groups(self, clusters: Parts) -> None:
+        self._gpu.compute("tracing.roots", _BUILD, "write_roots").bind(
+            clusters_in=clusters,
+            leaf_count=self._gpu.constant(self._layout.groups),
+            roots=self._roots.read_write(),
+            root_boxes=self._boxes.read_write(),
+        ).dispatch_line(self._layout.groups)
+
+    def _finish_top(self, clusters: Parts) -> None:
+        self._gpu.compute("tracing.roots", _BUILD, "write_top").bind(
+            clusters_in=clusters, trace_root_out=self._root.read_write()
+        ).dispatch(1)
+
+    # --- motion ---------------------------------------------------------------------------------------------------
+
+    def move(self, transforms: Mapping[int, Mat4]) -> None:
+        """Place instances anew: recorded before the rays of the same frame, without a new build.
+
+        The upper tree keeps its shape; after long ways :meth:`build` makes it a better one.
+
+        Args:
+            transforms: 4×4 (row-major, column vectors) by the instance's index in the scene.
+
+        Raises:
+            ParameterError: no such instance, one that is part of world space (see ``movable``), or a flat transform.
+        """
+        layout = self._layout
+        hanging = {int(i) for i in layout.hanging}
+        count = len(layout.instances) - 1
+        matrices = {}
+        for index, transform in transforms.items():
+            if not 0 <= index < count:
+                raise ParameterError(f"instances[{index}]: there are {count}")
+            if index not in hanging:
+                raise ParameterError(f"instances[{index}]: is placed once; World(…, movable=True) lets it move")
+            matrix = np.asarray(transform, np.float64)
+            if matrix.shape != (4, 4) or not np.isfinite(matrix).all() or is_flat(matrix):
+                raise ParameterError(
+                    f"instances[{index}]: the transform is not 4×4 finite numbers that have an inverse"
+                )
+            matrices[index] = matrix
+        # The device keeps each instance's root, which it has written itself: only what is before it is replaced.
+        size, kept = layout.instances.itemsize, layout.instances.dtype.fields["root"][1]  # type: ignore[index]
+        for index, matrix in matrices.items():
+            row = layout.instances[index]
+            place(row, matrix, int(row["group"]))
+            self._gpu.write(self._instances, np.frombuffer(row.tobytes()[:kept], np.uint8), size * index)
+        if self._upper is None:
+            return
+        gpu = self._gpu
+        scope = {**self._scope, "trace_nodes": self._nodes.split(write=True)}
+        for first, end in itertools.pairwise(self._upper.starts):
+            gpu.compute("tracing.refit", _BUILD, "refit").bind(
+                scope, first_node=gpu.constant(first), node_end=gpu.constant(end)
+            ).dispatch_line(end - first)
+
+    # --- life -----------------------------------------------------------------------------------------------------
+
+    @property
+    def triangle_count(self) -> int:
+        """Triangles in the tree: those of a mesh that is placed several times count once."""
+        return self._layout.leaves
+
+    def resources(self) -> list[Resource]:
+        """What the world holds on the device, without meshes that are another's."""
+        return [*self._buffers, *(self._meshes.resources() if self._own_meshes else ())]
+
+    def close(self) -> None:
+        """Free all device memory."""
+        for buffer in self._buffers:
+            buffer.destroy()
+        self._buffers.clear()
+        if self._own_meshes:
+            self._meshes.close()
+        self._gpu.forget_groups()
