@@ -38,6 +38,7 @@ from tyndall.scene.model import (
 from tyndall.techniques import FAMILIES, Technique
 from tyndall.techniques.contract import View
 from tyndall.techniques.shadow.shadow_map import first_layers
+from tyndall.tracing.world import World
 
 OWNER = "frame"
 _CAMERA = "package::wesl::camera::Camera"
@@ -117,6 +118,7 @@ class Renderer(Closing):
         self._resources: list[Resource] = []
         self._images: dict[str, Texture] = {}
         self._content: list[Meshes] = []
+        self._world: World | None = None
         self._frame = 0
         self._history = 0
         self._previous: NDArray[np.float64] | None = None
@@ -185,8 +187,17 @@ class Renderer(Closing):
             self._history = 0
             self._resolved = self._images["lit"]
         owner = f"{family}.{made.name}"
-        self._views[family] = View(self.gpu, self.scene, self.size, owner, made, self._images)
+        self._views[family] = View(
+            self.gpu, self.scene, self.size, owner, made, self._images, make_world=lambda: self.world
+        )
         return made
+
+    @property
+    def world(self) -> World:
+        """The scene for rays; built when it is asked for first."""
+        if self._world is None:
+            self._world = World(self.gpu, self.scene, meshes=self._content[0])
+        return self._world
 
     def technique(self, family: str) -> Any:
         """The technique in use."""
@@ -194,16 +205,17 @@ class Renderer(Closing):
 
     # --- the frame ------------------------------------------------------------------------------------------------
 
-    def draw(self, camera: Camera | None = None, *, jitter: bool = True) -> float:
+    def draw(self, camera: Camera | None = None, *, jitter: bool = True, casters: bool = True) -> float:
         """Record and submit one frame, without waiting for it; returns the host's time in milliseconds.
 
         Args:
             camera: in place of the scene's.
             jitter: False draws through the pixels' centres whatever the antialiasing technique.
+            casters: False leaves shadow maps empty, so that light reaches everything.
         """
         begin = time.perf_counter()
         try:
-            self._record(camera or self.scene.camera, jitter)
+            self._record(camera or self.scene.camera, jitter, casters)
         except BaseException:
             self.gpu.discard()  # half a frame must not precede the next one
             raise
@@ -212,7 +224,7 @@ class Renderer(Closing):
         self._history += 1
         return (time.perf_counter() - begin) * 1e3
 
-    def _record(self, camera: Camera, jitter: bool) -> None:
+    def _record(self, camera: Camera, jitter: bool, casters: bool) -> None:
         gpu, images = self.gpu, self._images
         self._update(camera, jitter)
         scope = self._scope
@@ -224,7 +236,7 @@ class Renderer(Closing):
 
         shadow = self._view("shadow")
         shadow.maps_wanted = self.technique("volumetric").reads_maps
-        visibility = self.technique("shadow").render(shadow, self._content)
+        visibility = self.technique("shadow").render(shadow, self._content if casters else [])
         occlusion = self.technique("occlusion").render(self._view("occlusion"))
         scope = {**scope, **visibility.bindings, **occlusion.bindings}
         overlay = {
@@ -278,6 +290,21 @@ class Renderer(Closing):
         """(height, width, 3) uint8: the tone-mapped picture."""
         return np.ascontiguousarray(self.gpu.read_texture(self._images["picture"])[..., :3])
 
+    def develop(self, radiance: NDArray[np.float32]) -> NDArray[np.uint8]:
+        """(height, width, 3) uint8: linear light of that shape, exposed and tone-mapped as a frame is.
+
+        It comes in the place of the frame drawn last.
+        """
+        light = np.zeros((*radiance.shape[:2], 4), np.float16)
+        light[..., :3] = np.clip(radiance, 0, np.finfo(np.float16).max)
+        self._update(self.scene.camera, jitter=False)
+        self._resolved = self._images["lit"]
+        self.gpu.write_texture(self._resolved, light)
+        self.technique("tonemap").render(self._view("tonemap"), self._resolved, self._images["picture"])
+        self.gpu.submit()
+        self.restart()
+        return self.picture()
+
     def radiance(self) -> NDArray[np.float32]:
         """(height, width, 3) float32: linear light after antialiasing, before exposure and tone mapping."""
         return np.ascontiguousarray(self.gpu.read_texture(self._resolved)[..., :3].astype(np.float32))
@@ -318,6 +345,8 @@ class Renderer(Closing):
         """
         totals: Counter[str] = Counter()
         held = [content.resources() for content in self._content] + [view.resources() for view in self._views.values()]
+        if self._world:
+            held.append(self._world.resources())
         for resource in itertools.chain(self._resources, *held):
             totals[resource.owner] += resource.size_bytes
         return dict(totals)
@@ -327,6 +356,9 @@ class Renderer(Closing):
         self.gpu.discard()
         for view in self._views.values():
             view.close()
+        if self._world:
+            self._world.close()
+            self._world = None
         for content in self._content:
             content.close()
         for resource in self._resources:

@@ -17,6 +17,7 @@ from tyndall.gpu.device import ComputePass, Gpu
 from tyndall.gpu.params import check
 from tyndall.gpu.resources import Bound, Buffer, ParamsBuffer, Resource, Texture
 from tyndall.scene.model import Scene
+from tyndall.tracing.world import World
 
 
 class Unsupported(ValueError):  # noqa: N818 - a refusal, not a fault
@@ -41,6 +42,11 @@ class Technique:
     def __post_init__(self) -> None:
         check(self)
 
+    @property
+    def up_to_scale(self) -> bool:
+        """Whether its light is right only up to a factor: the models of the papers have units of their own."""
+        return getattr(self, "model", None) == "paper"
+
     def supports(self, scene: Scene) -> None:
         """Raise :class:`Unsupported` if the technique cannot draw a scene."""
 
@@ -61,6 +67,7 @@ class View:
         overlay: virtual modules, ``package::visibility`` among them once the shadows are drawn.
         size: width and height of the picture in pixels.
         frame: frames drawn before this one.
+        make_world: gives :attr:`world`.
         owner: "family.name": owner in the ledger and prefix of its passes.
         maps_wanted: whether the volumetric technique reads shadow maps; what a shadow technique need not draw
             otherwise.
@@ -76,10 +83,17 @@ class View:
     overlay: dict[str, str] = field(default_factory=dict)
     frame: int = 0
     maps_wanted: bool = False
+    make_world: Callable[[], World] | None = None
     _resources: dict[str, Resource] = field(default_factory=dict)
     _descriptions: dict[str, Any] = field(default_factory=dict)
     _params: ParamsBuffer | None = None
     _parts: dict[str, View] = field(default_factory=dict)
+
+    @property
+    def world(self) -> World:
+        """The scene for rays, which all techniques of a frame share; built when it is asked for first."""
+        assert self.make_world is not None, "this view is of no frame"
+        return self.make_world()
 
     @property
     def params(self) -> Bound:
@@ -134,7 +148,14 @@ class View:
             if made is not None:
                 made.close()
                 self.gpu.forget_groups()
-            made = View(self.gpu, self.scene, self.size, f"{self.owner}.{technique.name}", technique)
+            made = View(
+                self.gpu,
+                self.scene,
+                self.size,
+                f"{self.owner}.{technique.name}",
+                technique,
+                make_world=self.make_world,
+            )
             self._parts[technique.name] = made
         made.images, made.scope, made.overlay, made.frame = self.images, self.scope, self.overlay, self.frame
         return made
