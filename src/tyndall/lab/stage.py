@@ -1,9 +1,9 @@
 """One scene on one device at one size, to be drawn by one technique after another.
 
 Comparisons must differ in one thing only. A :class:`Stage` keeps the rest: the device with its compiled pipelines, the
-scene on that device, the size, the seed, and the techniques of the other families. :meth:`Stage.still` draws the one
-frame that errors are measured on: no antialiasing, hence no camera jitter, so that equal pixels of two techniques look
-along equal rays.
+scene on that device, the size, the seed, and the techniques of the other families. :meth:`Stage.still` draws the frame
+that errors are measured on: no antialiasing, hence no camera jitter, so that equal pixels of two techniques, and of a
+traced truth, look along equal rays.
 """
 
 from __future__ import annotations
@@ -22,17 +22,31 @@ from tyndall.gpu.resources import Closing
 from tyndall.lab.picture import Picture
 from tyndall.scene.model import Scene
 from tyndall.techniques import FAMILIES
+from tyndall.techniques.antialiasing import NoAntialiasing
 from tyndall.techniques.contract import Technique
+from tyndall.techniques.shadow import ShadowMap
+from tyndall.techniques.volumetric import March
 
 Overrides = Mapping[str, Mapping[str, Any]]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Still:
-    """One frame without antialiasing. ``light`` is ``L_v``, (H, W, 3) float32 linear."""
+    """One frame without antialiasing; all light is (H, W, 3) float32, linear.
+
+    Attributes:
+        picture: the whole frame.
+        light: ``L_v``, what the air scatters towards the eye.
+        surfaces: ``L_b·T``, what reaches the eye from surfaces and the background.
+    """
 
     picture: Picture
     light: NDArray[np.float32]
+    surfaces: NDArray[np.float32]
+
+    def of(self, kind: str) -> NDArray[np.float32]:
+        """Its light of a kind: "inscattered", "surfaces" or "radiance" (both)."""
+        return {"inscattered": self.light, "surfaces": self.surfaces, "radiance": self.picture.radiance}[kind]
 
 
 def make(family: str, chosen: str | Technique | None, scene: Scene, parameters: Overrides | None = None) -> Technique:
@@ -48,6 +62,11 @@ def make(family: str, chosen: str | Technique | None, scene: Scene, parameters: 
     group = FAMILIES[family]
     name = chosen.name if isinstance(chosen, Technique) else chosen or group.default
     return group.make(chosen, scene.looks, (parameters or {}).get(name))
+
+
+def family_of(technique: Technique) -> str:
+    """The name of the family that a technique is a member of."""
+    return next(f.name for f in FAMILIES.values() if type(technique) in f.members.values())
 
 
 def describe(technique: Technique) -> dict[str, Any]:
@@ -72,7 +91,8 @@ class Stage(Closing):
 
     Args:
         adapter: part of an adapter's name, or a device to share; a shared one is left open.
-        shadow, occlusion, antialiasing, tonemap: techniques by name, ready made, or None for the family's default.
+        volumetric, shadow, occlusion, antialiasing, tonemap: techniques by name, ready made, or None for the family's
+            default; ``techniques`` has them by family.
 
     Raises:
         GpuError: no such adapter, or a size beyond its limits.
@@ -84,6 +104,7 @@ class Stage(Closing):
         scene: Scene,
         size: tuple[int, int],
         *,
+        volumetric: str | Technique | None = None,
         shadow: str | Technique | None = None,
         occlusion: str | Technique | None = None,
         antialiasing: str | Technique | None = None,
@@ -97,24 +118,22 @@ class Stage(Closing):
             if name not in known:
                 raise ParameterError(f"parameters: no technique '{name}'{nearest(name, known)}")
         self.scene, self.size, self.seed = scene, size, seed
-        self.shadow = make("shadow", shadow, scene, parameters)
-        self.occlusion = make("occlusion", occlusion, scene, parameters)
-        self.antialiasing = make("antialiasing", antialiasing, scene, parameters)
-        self.tonemap = make("tonemap", tonemap, scene, parameters)
+        chosen = {
+            "volumetric": volumetric,
+            "shadow": shadow,
+            "occlusion": occlusion,
+            "antialiasing": antialiasing,
+            "tonemap": tonemap,
+        }
+        self.techniques = {family: make(family, name, scene, parameters) for family, name in chosen.items()}
         self._owned = not isinstance(adapter, Gpu)
         self.gpu = adapter if isinstance(adapter, Gpu) else Gpu(adapter)
         try:
-            self._renderer = Renderer(
-                scene,
-                size,
-                gpu=self.gpu,
-                volumetric="off",
-                shadow=self.shadow,
-                occlusion=self.occlusion,
-                antialiasing=self.antialiasing,
-                tonemap=self.tonemap,
-                seed=seed,
-            )
+            # What cannot draw the scene is refused when it is used, not here.
+            others: dict[str, Any] = {
+                family: made for family, made in self.techniques.items() if family != "volumetric"
+            }
+            self._renderer = Renderer(scene, size, gpu=self.gpu, seed=seed, volumetric="off", **others)
         except BaseException:
             if self._owned:
                 self.gpu.close()
@@ -130,35 +149,52 @@ class Stage(Closing):
         """The driver and the interface it is reached through."""
         return driver_name(self.gpu)
 
-    def use(self, volumetric: Technique, *, still: bool = False) -> Renderer:
-        """The renderer with a volumetric technique, at its first frame; ``still`` leaves antialiasing out.
+    def use(self, technique: Technique, *, still: bool = False) -> Renderer:
+        """The renderer with a technique in its family, the stage's own in the others, at its first frame.
+
+        ``still`` leaves antialiasing out.
 
         Raises:
             Unsupported: the technique cannot draw this scene.
         """
-        self._renderer.use("volumetric", volumetric)
-        self._renderer.use("antialiasing", "none" if still else self.antialiasing)
+        wanted = {**self.techniques, family_of(technique): technique}
+        if still:
+            wanted["antialiasing"] = NoAntialiasing()
+        for family, made in wanted.items():
+            # The measured one begins anew, whatever it kept; the others only where they differ.
+            if made is technique or made != self._renderer.technique(family):
+                self._renderer.use(family, made)
         self._renderer.restart()
         return self._renderer
 
-    def still(self, volumetric: Technique) -> Still:
-        """One frame without antialiasing."""
-        renderer = self.use(volumetric, still=True)
-        renderer.draw()
-        return Still(self.picture(volumetric.name), renderer.inscattered())
+    def still(self, technique: Technique, *, frames: int = 1) -> Still:
+        """A frame without antialiasing: the last of ``frames``, over which a technique may gather samples."""
+        renderer = self.use(technique, still=True)
+        for _ in range(frames):
+            renderer.draw()
+        return self._still(technique.name)
+
+    def unshadowed(self) -> Still:
+        """The same view where nothing casts a shadow, its air marched through by few steps."""
+        self.use(March(steps=32, jitter=0), still=True)
+        self._renderer.use("shadow", ShadowMap(size=16))
+        self._renderer.restart()
+        self._renderer.draw(casters=False)
+        return self._still("unshadowed")
+
+    def develop(self, radiance: NDArray[np.float32]) -> NDArray[np.uint8]:
+        """(H, W, 3) linear light, as the stage's tone mapping shows it: (H, W, 3) uint8."""
+        return self._renderer.develop(radiance)
 
     def resized(self, size: tuple[int, int]) -> Stage:
         """Another stage that differs in its size only, on the same device."""
-        return Stage(
-            self.scene,
-            size,
-            shadow=self.shadow,
-            occlusion=self.occlusion,
-            antialiasing=self.antialiasing,
-            tonemap=self.tonemap,
-            adapter=self.gpu,
-            seed=self.seed,
-        )
+        same: dict[str, Any] = dict(self.techniques)
+        return Stage(self.scene, size, adapter=self.gpu, seed=self.seed, **same)
+
+    def _still(self, technique: str) -> Still:
+        renderer = self._renderer
+        surfaces = renderer.base() * renderer.transmittance()
+        return Still(self.picture(technique), renderer.inscattered(), surfaces)
 
     def picture(self, technique: str) -> Picture:
         """The frame drawn last."""

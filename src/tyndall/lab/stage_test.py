@@ -37,3 +37,46 @@ def test_a_technique_is_described_by_its_parameters() -> None:
     described = describe(make("volumetric", "froxel", scene, {"froxel": {"grid": (8, 8, 8)}}))
     assert described["technique"] == "froxel"
     assert described["grid"] == (8, 8, 8)
+
+
+def test_a_technique_of_any_family_takes_its_family_s_place(gpu: Gpu) -> None:
+    scene = box()
+    coarse = make("shadow", "shadow_map", scene, {"shadow_map": {"size": 16}})
+    with Stage(scene, (48, 27), volumetric="march", adapter=gpu) as stage:
+        fine = stage.still(stage.techniques["shadow"])
+        rough = stage.still(coarse)
+        again = stage.still(make("volumetric", "march", scene))
+    assert fine.light.mean() > 0, "the stage's own volumetric technique is in use"
+    assert not np.array_equal(fine.light, rough.light)
+    assert np.array_equal(fine.light, again.light), "the stage's own shadows are back"
+
+
+def test_without_shadows_everything_is_at_least_as_bright(gpu: Gpu) -> None:
+    scene = box()
+    with Stage(scene, (48, 27), adapter=gpu) as stage:
+        full = stage.unshadowed()
+        still = stage.still(make("volumetric", "march", scene, {"march": {"jitter": 0, "steps": 32}}))
+    for kind in ("inscattered", "surfaces"):
+        light, most = still.of(kind), full.of(kind)
+        assert (light <= most * 1.01 + 1e-3 * float(most.mean())).all()
+        assert light.mean() < 0.9 * most.mean(), "a room with one opening"
+    np.testing.assert_array_equal(still.picture.depth, full.picture.depth)
+
+
+def test_the_parts_of_a_still_frame_are_the_whole(gpu: Gpu) -> None:
+    scene = box()
+    with Stage(scene, (48, 27), adapter=gpu) as stage:
+        still = stage.still(make("volumetric", "froxel", scene))
+    whole = still.of("surfaces") + still.of("inscattered")
+    np.testing.assert_allclose(still.of("radiance"), whole, rtol=3e-3, atol=1e-4)
+
+
+def test_light_is_developed_as_a_frame_is(gpu: Gpu) -> None:
+    scene = box()
+    with Stage(scene, (48, 27), adapter=gpu) as stage:
+        still = stage.still(make("volumetric", "march", scene))
+        stage.still(make("volumetric", "off", scene))
+        assert np.array_equal(stage.develop(still.picture.radiance), still.picture.pixels)
+        assert not stage.develop(np.full((27, 48, 3), -1.0, np.float32)).max() > 1, "but for the dither"
+        after = stage.still(make("volumetric", "march", scene))
+    assert np.array_equal(after.picture.pixels, still.picture.pixels)

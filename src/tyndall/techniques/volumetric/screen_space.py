@@ -48,6 +48,11 @@ class ScreenSpace(Technique):
     exposure: float = param(1.0, 0, None, "strength of the effect (paper)")
     weight: float = param(0.01, 0, None, "strength of a sample (paper)")
 
+    @property
+    def up_to_scale(self) -> bool:
+        """Always: how much of the picture is sky stands for how much of the air is lit."""
+        return True
+
     def supports(self, scene: Scene) -> None:
         """Raise :class:`Unsupported` for a light that the paper's equations cannot describe."""
         if self.model == "paper":
