@@ -658,22 +658,24 @@ class ComputePass:
 
     def dispatch(self, width: int, height: int = 1, depth: int = 1) -> None:
         """Run one thread for each element of the given size (rounded up to whole workgroups; the shader checks)."""
-        x, y, z = self._gpu.linker.workgroup(self._module, self._entry)
-        self._encode(lambda native: native.dispatch_workgroups(-(-width // x), -(-height // y), -(-depth // z)))
+        self._encode(lambda x, y, z: (-(-width // x), -(-height // y), -(-depth // z)))
 
     def dispatch_line(self, count: int) -> None:
         """Run one thread for each of ``count`` elements, in rows of :data:`LINE` workgroups: the limit of one dimension
         is 65,535. The shader's index is ``(workgroup.y · LINE + workgroup.x) · size + local``.
         """
-        groups = -(-count // self._gpu.linker.workgroup(self._module, self._entry)[0])
-        rows = max(1, -(-groups // LINE))
-        self._encode(lambda native: native.dispatch_workgroups(LINE if rows > 1 else max(1, groups), rows))
+        self._encode(lambda x, _y, _z: line_of(-(-count // x)))
 
     def dispatch_indirect(self, arguments: Buffer, offset: int = 0) -> None:
         """Run as many workgroups as three ``u32`` of a buffer say, at a byte offset."""
-        self._encode(lambda native: native.dispatch_workgroups_indirect(arguments.native, offset))
+        self._encode(None, arguments, offset)
 
-    def _encode(self, dispatch: Callable[[Any], object]) -> None:
+    def _encode(
+        self,
+        groups: Callable[[int, int, int], tuple[int, int, int]] | None,
+        arguments: Buffer | None = None,
+        at: int = 0,
+    ) -> None:
         gpu = self._gpu
         program = gpu._program(self._module, (self._entry,), self._bound, self._overlay, self._features, None)
         group = gpu._group(program, self._bound)
@@ -682,8 +684,16 @@ class ComputePass:
         native = encoder.begin_compute_pass(label=self._label, **({"timestamp_writes": stamps} if stamps else {}))
         native.set_pipeline(program.pipeline)
         native.set_bind_group(0, group)
-        dispatch(native)
+        if groups is not None:
+            native.dispatch_workgroups(*groups(*gpu.linker.workgroup(self._module, self._entry)))
+        elif arguments is not None:
+            native.dispatch_workgroups_indirect(arguments.native, at)
         native.end()
+
+
+def line_of(groups: int) -> tuple[int, int, int]:
+    """That many workgroups, or a few more, in rows of no more than :data:`LINE`."""
+    return (min(max(groups, 1), LINE), max(1, -(-groups // LINE)), 1)
 
 
 def _as_bound(value: Any) -> Bound:

@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tyndall.gpu.device import LINE, Gpu, GpuError
+from tyndall.gpu.device import Gpu, GpuError, line_of
 from tyndall.gpu.resources import Buffer, Closing, Parts, Resource
 
 OWNER = "tracing"
@@ -120,8 +120,7 @@ class Clustering(Closing):
         rows = np.zeros(2 * _PATIENCE + 2, self._progress.dtype)
         rows[0] = (self._leaves, self._first)
         gpu.write(self._progress, rows)
-        groups = -(-self._leaves // _THREADS)
-        gpu.write(self._arguments, np.array([min(groups, LINE), -(-groups // LINE), 1], np.uint32))
+        gpu.write(self._arguments, np.array(line_of(-(-self._leaves // _THREADS)), np.uint32))
         gpu.write(self._deepest, np.zeros(4, np.uint32))
         step = 0
         left = self._leaves
