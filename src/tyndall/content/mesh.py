@@ -288,7 +288,8 @@ def _normal_columns(world: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def normal_rows(linear: NDArray[np.float64]) -> NDArray[np.float64]:
     """(3, 3): the matrix that takes normals with it where ``linear`` takes positions, to a scale."""
-    return _normal_columns(linear[None])[0].T
+    rows: NDArray[np.float64] = _normal_columns(linear[None])[0].T
+    return rows
 
 
 def _uv_columns(texture: SceneTexture | None) -> NDArray[np.float64]:

@@ -80,7 +80,7 @@ def blocked(
         gpu.compute("tracing.cast", _MODULE, "cast_occluded").bind(
             world.bindings, rays=rays_in, answers=out.read_write(), ray_count=gpu.constant(len(rays))
         ).dispatch_line(len(rays))
-        found = gpu.read_buffer(out)[: len(rays)] != 0
+        found: NDArray[np.bool_] = gpu.read_buffer(out)[: len(rays)] != 0
     gpu.forget_groups()
     return found
 

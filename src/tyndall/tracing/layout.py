@@ -62,16 +62,15 @@ def arrange(
         dtypes: layouts of "Part", "Placed" and "Box".
         movable: give every mesh a group of its own.
     """
-    number = {mesh: i for i, mesh in enumerate(placed)}
+    number = {key: i for i, key in enumerate(placed)}
     uses = Counter(id(instance.mesh) for instance in scene.instances)
     groups: dict[int, int] = {}
     of_instance = []
     for instance in scene.instances:
-        mesh = id(instance.mesh)
-        own = (
-            (movable or uses[mesh] > 1) and not is_flat(np.asarray(instance.transform)) and len(groups) < MAX_GROUPS - 1
-        )
-        of_instance.append(groups.setdefault(mesh, 1 + len(groups)) if own else 0)
+        key = id(instance.mesh)
+        shared = (movable or uses[key] > 1) and not is_flat(np.asarray(instance.transform))
+        own = key in groups or len(groups) < MAX_GROUPS - 1
+        of_instance.append(groups.setdefault(key, 1 + len(groups)) if shared and own else 0)
 
     count = len(scene.instances)
     instances = np.zeros(count + 1, dtypes["Placed"])

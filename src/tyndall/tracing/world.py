@@ -83,6 +83,9 @@ class World(Closing):
         for row, (mesh, (_, vertex)) in zip(rows, meshes.placed.items(), strict=False):
             row["first_vertex"], row["material"] = vertex, meshes.material_of[mesh]
         maps, texels = self._textures()
+        self._parts = self._buffer("parts", layout.parts, f"{_BUILD}::Part")
+        self._hanging = self._buffer("hanging", layout.hanging)
+        self._box = self._buffer("box", layout.box, f"{_BUILD}::Box")
         self.bindings: dict[str, Any] = {
             "trace_root": self._root.read(),
             "trace_nodes": self._nodes.split(),
@@ -131,20 +134,18 @@ class World(Closing):
         self.depth = 0
         if not layout.leaves:
             return
-        parts = self._buffer("parts", layout.parts, f"{_BUILD}::Part")
         scope = {
             **self.bindings,
-            "parts": parts.read(),
+            "parts": self._parts.read(),
             "part_count": gpu.constant(len(layout.parts)),
             "group_boxes": self._boxes.read(),
             "trace_positions": meshes.positions.split("f32"),
         }
         lower = self._cluster(layout.leaves, layout.groups, 0, "triangle", scope, self._finish_groups)
-        hanging = self._buffer("hanging", layout.hanging)
         self._scope = {
             **self.bindings,
-            "group_boxes": self._buffer("box", layout.box, f"{_BUILD}::Box").read(),
-            "hanging": hanging.read(),
+            "group_boxes": self._box.read(),
+            "hanging": self._hanging.read(),
             "instances": self._instances.read_write(),
             "roots": self._roots.read(),
             "root_boxes": self._boxes.read(),
