@@ -35,7 +35,7 @@ _mirror = ((-1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1))
 SHAPES = [props.floor(-1, 5), Instance(props.box((-1, -1, -4), (0, 0, -3)).mesh, _mirror), props.wall(-5, 2, _leaf)]
 LIGHTS = [
     DirectionalLight((0.2, -1, 0.4)),
-    PointLight((0, 1, -2)),
+    PointLight((0, 1, -2), radius=0.1),
     SpotLight((1, 2, -2), (-0.2, -1, -0.2)),
 ]
 

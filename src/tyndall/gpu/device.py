@@ -478,7 +478,7 @@ class Gpu(Closing):
         features: Mapping[str, bool] | None = None,
     ) -> tuple[Any, Any]:
         """(pipeline, bind group) for drawing; record them into a render pass or a bundle."""
-        bound = {name: _as_bound(value) for name, value in bindings.items()}
+        bound = _all_bound(bindings)
         entries = (vertex,) if fragment is None else (vertex, fragment)
         program = self._program(module, entries, bound, overlay or {}, features or {}, state)
         return program.pipeline, self._group(program, bound)
@@ -637,13 +637,7 @@ class ComputePass:
         """Give names to resources: a :class:`Bound`, :class:`Parts`, or a texture (sampled), buffer (read) or
         parameter buffer.
         """
-        for name, value in {**(scope or {}), **resources}.items():
-            if type(value) is Bound:
-                self._bound[name] = value
-            elif isinstance(value, Parts):
-                self._bound.update(value.named(name))
-            else:
-                self._bound[name] = _as_bound(value)
+        self._bound.update(_all_bound({**(scope or {}), **resources}))
         return self
 
     def overlay(self, modules: Mapping[str, str]) -> Self:
@@ -694,6 +688,18 @@ class ComputePass:
 def line_of(groups: int) -> tuple[int, int, int]:
     """That many workgroups, or a few more, in rows of no more than :data:`LINE`."""
     return (min(max(groups, 1), LINE), max(1, -(-groups // LINE)), 1)
+
+
+def _all_bound(resources: Mapping[str, Any]) -> dict[str, Bound]:
+    bound: dict[str, Bound] = {}
+    for name, value in resources.items():
+        if type(value) is Bound:
+            bound[name] = value
+        elif isinstance(value, Parts):
+            bound.update(value.named(name))
+        else:
+            bound[name] = _as_bound(value)
+    return bound
 
 
 def _as_bound(value: Any) -> Bound:

@@ -2,5 +2,6 @@
 
 from tyndall.techniques.contract import Technique
 from tyndall.techniques.occlusion.none import NoOcclusion
+from tyndall.techniques.occlusion.ray_traced_ao import RayTracedAo
 
-MEMBERS: tuple[type[Technique], ...] = (NoOcclusion,)
+MEMBERS: tuple[type[Technique], ...] = (NoOcclusion, RayTracedAo)

@@ -1,6 +1,7 @@
 """Shadow techniques: each draws what it needs and provides ``visibility(light, position, normal)``."""
 
 from tyndall.techniques.contract import Technique
+from tyndall.techniques.shadow.ray_traced import RayTraced
 from tyndall.techniques.shadow.shadow_map import ShadowMap
 
-MEMBERS: tuple[type[Technique], ...] = (ShadowMap,)
+MEMBERS: tuple[type[Technique], ...] = (ShadowMap, RayTraced)
