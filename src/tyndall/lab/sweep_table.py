@@ -1,0 +1,80 @@
+"""A sweep's rows for a terminal: what varies between its points, and what was measured."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tyndall.lab.sweep_store import flat
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+_MEASURING = frozenset({"frames", "warmup", "seconds", "seed", "metrics"})
+_MOST_REASON = 60
+
+
+def table(rows: Sequence[Mapping[str, Any]], notes: Sequence[str] = ()) -> Table:
+    """One line a point, by rich."""
+    from rich import box
+    from rich.table import Table
+
+    points = [_point(row) for row in rows]
+    varied = _varied(points)
+    common = {name: value for name, value in (points[0] if points else {}).items() if name not in varied}
+    title = " · ".join(_text(common[name]) for name in ("scene", "size", "technique") if name in common)
+    made = Table(title=title, caption="\n".join(notes), caption_justify="left", box=box.SIMPLE_HEAD, padding=0)
+    made.show_edge = False
+    for name in varied:
+        made.add_column(name, no_wrap=True)
+    for heading in ("GPU ms", "p95", "frame ms", "host ms", "MiB", "L_v rel. RMSE", "bias"):
+        made.add_column(heading, justify="right", no_wrap=True)
+    for row, point in zip(rows, points, strict=True):
+        own = [_text(point.get(name)) for name in varied]
+        made.add_row(*own, *(_figures(row) if row["status"] == "done" else _reason(row)))
+    return made
+
+
+def _point(row: Mapping[str, Any]) -> dict[str, Any]:
+    """What a point is, flat; its measuring left out."""
+    plain = flat({"point": row["point"]})
+    width, height = plain.pop("width"), plain.pop("height")
+    named = {"scene": Path(str(plain.pop("scene"))).name, "lights": plain.pop("lights"), "size": f"{width}×{height}"}
+    return {**named, **{name: value for name, value in plain.items() if name not in _MEASURING}}
+
+
+def _varied(points: Sequence[Mapping[str, Any]]) -> list[str]:
+    """The names whose values differ between points that have them; the technique's always, where there is one point."""
+    names = dict.fromkeys(name for point in points for name in point)
+    found = []
+    for name in names:
+        values = {str(point[name]) for point in points if name in point}
+        if len(values) > 1:
+            found.append(name)
+    return found or ["technique"]
+
+
+def _figures(row: Mapping[str, Any]) -> list[str]:
+    light = (row["errors"] or {}).get("inscattered", {})
+    gpu, frame, host = row["gpu_ms"] or {}, row["frame_ms"] or {}, row["host_ms"] or {}
+    error = light.get("rel_rmse_corrected", light.get("rel_rmse"))
+    return [
+        *(_ms(value) for value in (gpu.get("median"), gpu.get("p95"), frame.get("median"), host.get("median"))),
+        f"{row['memory_bytes'] / 2**20:.2f}",
+        "–" if error is None else f"{100 * error:.2f} %",
+        "–" if light.get("bias") is None else f"{100 * light['bias']:+.2f} %",
+    ]
+
+
+def _reason(row: Mapping[str, Any]) -> list[str]:
+    reason = str(row["reason"])
+    return [row["status"], *5 * ["–"], reason if len(reason) <= _MOST_REASON else f"{reason[:_MOST_REASON]}…"]
+
+
+def _ms(value: float | None) -> str:
+    return "–" if value is None else f"{value:.3f}" if value < 10 else f"{value:.1f}"
+
+
+def _text(value: Any) -> str:
+    return "–" if value is None else str(value)
