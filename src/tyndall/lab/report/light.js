@@ -1,0 +1,146 @@
+// Linear light out of the page, and its way to the screen: exposure, tone curve, sRGB. See light.py for the format.
+
+const CODES = 0x7bff >> 3;
+
+/** The light that each code stands for. */
+const lightOfCode = Float32Array.from({ length: CODES + 1 }, (_, code) => {
+  const half = code << 3, exponent = half >> 10, fraction = half & 1023;
+  return exponent ? 2 ** (exponent - 15) * (1 + fraction / 1024) : 2 ** -14 * (fraction / 1024);
+});
+
+/** Codes of red, green and blue, pixel by pixel, from the text of a block. */
+async function decodeLight(text, width, height) {
+  const packed = Uint8Array.from(atob(text.trim()), (character) => character.charCodeAt(0));
+  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
+  const bytes = new Uint8Array(await new Response(stream).arrayBuffer());
+  const count = width * height;
+  const codes = new Uint16Array(3 * count);
+  const step = (at) => {
+    const folded = bytes[at] | (bytes[at + 3 * count] << 8);
+    return (folded >>> 1) ^ -(folded & 1);
+  };
+  for (let y = 0, at = 0; y < height; y++) {
+    let green = 0, red = 0, blue = 0; // red and blue less green
+    for (let x = 0; x < width; x++, at++) {
+      green += step(at);
+      red += step(count + at);
+      blue += step(2 * count + at);
+      codes[3 * at] = green + red;
+      codes[3 * at + 1] = green;
+      codes[3 * at + 2] = green + blue;
+    }
+  }
+  return codes;
+}
+
+const LEVELS = 8191;
+const srgbOfLevel = Uint8ClampedArray.from({ length: LEVELS + 1 }, (_, level) => {
+  const x = level / LEVELS;
+  return 255 * (x <= 0.0031308 ? 12.92 * x : 1.055 * x ** (1 / 2.4) - 0.055);
+});
+const encode = (x) => srgbOfLevel[x <= 0 ? 0 : x >= 1 ? LEVELS : (x * LEVELS + 0.5) | 0];
+
+// The curves of tyndall's tonemap.wesl, without its dither: each maps light to three bytes of `out` from `at` on.
+const TONES = {
+  none(r, g, b, out, at) {
+    out[at] = encode(r);
+    out[at + 1] = encode(g);
+    out[at + 2] = encode(b);
+  },
+  aces(r, g, b, out, at) {
+    // Rec.709 to the fit's input space, rational fit of RRT and ODT, and back (Hill 2016).
+    const fit = (v) => (v * (v + 0.0245786) - 0.000090537) / (v * (0.983729 * v + 0.432951) + 0.238081);
+    const x = fit(0.59719 * r + 0.35458 * g + 0.04823 * b);
+    const y = fit(0.076 * r + 0.90834 * g + 0.01566 * b);
+    const z = fit(0.0284 * r + 0.13383 * g + 0.83777 * b);
+    out[at] = encode(1.60475 * x - 0.53108 * y - 0.07367 * z);
+    out[at + 1] = encode(-0.10208 * x + 1.10813 * y - 0.00605 * z);
+    out[at + 2] = encode(-0.00327 * x - 0.07276 * y + 1.07602 * z);
+  },
+  agx(r, g, b, out, at) {
+    // Sobotka's AgX in the polynomial form of Wrensch 2023; its output is display-encoded already.
+    const curve = (v) => {
+      const x = (clamp(Math.log2(Math.max(v, 1e-10)), -12.47393, 4.026069) + 12.47393) / 16.499999;
+      const x2 = x * x, x4 = x2 * x2;
+      return 15.5 * x4 * x2 - 40.14 * x4 * x + 31.96 * x4 - 6.868 * x2 * x + 0.4298 * x2 + 0.1191 * x - 0.00232;
+    };
+    const x = curve(0.842479062253094 * r + 0.0784335999999992 * g + 0.0792237451477643 * b);
+    const y = curve(0.0423282422610123 * r + 0.878468636469772 * g + 0.0791661274605434 * b);
+    const z = curve(0.0423756549057051 * r + 0.0784336 * g + 0.879142973793104 * b);
+    out[at] = 255 * (1.19687900512017 * x - 0.0980208811401368 * y - 0.0990297440797205 * z);
+    out[at + 1] = 255 * (-0.0528968517574562 * x + 1.15190312990417 * y - 0.0989611768448433 * z);
+    out[at + 2] = 255 * (-0.0529716355144438 * x - 0.0980434501171241 * y + 1.15107367264116 * z);
+  },
+};
+
+/** A canvas with a picture's light at an exposure in EV. */
+function develop(codes, width, height, exposure, tone, canvas = make("canvas")) {
+  canvas.width = width;
+  canvas.height = height;
+  const context = canvas.getContext("2d");
+  const picture = context.createImageData(width, height);
+  const out = picture.data, curve = TONES[tone] ?? TONES.aces;
+  const exposed = lightOfCode.map((light) => light * 2 ** exposure);
+  for (let i = 0, at = 0; i < codes.length; i += 3, at += 4) {
+    curve(exposed[codes[i]], exposed[codes[i + 1]], exposed[codes[i + 2]], out, at);
+    out[at + 3] = 255;
+  }
+  context.putImageData(picture, 0, 0);
+  return canvas;
+}
+
+/**
+ * The pictures and error maps of a comparison as things that can be drawn.
+ *
+ * `get(index, show)` is what there is now, and when something better is ready, `arrived` is called.
+ */
+function makeGallery(article, study, state, arrived) {
+  const [width, height] = study.size;
+  const images = study.pictures.map((_, i) => article.querySelector(`.strip img[data-picture="${i}"]`));
+  for (const image of article.querySelectorAll(".strip img, .maps img")) image.addEventListener("load", arrived);
+  const codes = new Map(), developed = new Map();
+  const able = study.light && typeof DecompressionStream !== "undefined";
+
+  function request(index) {
+    if (codes.has(index)) return;
+    codes.set(index, null);
+    const block = document.getElementById(`${article.id}-light-${index}`);
+    decodeLight(block.textContent, width, height).then((found) => {
+      codes.set(index, found);
+      arrived();
+    }, (error) => console.error(`picture ${index} cannot be decoded: ${error}`));
+  }
+
+  function light(index) {
+    request(index);
+    const found = codes.get(index);
+    if (!found) return images[index];
+    const { exposure, tone } = state.values;
+    const name = `${exposure} ${tone}`;
+    const old = developed.get(index);
+    if (old?.name === name) return old.canvas;
+    const canvas = develop(found, width, height, study.exposure + exposure, tone, old?.canvas);
+    developed.set(index, { name, canvas });
+    return canvas;
+  }
+
+  return {
+    able,
+    get(index, show) {
+      if (show !== "picture") return findMap(article, show, study.pictures[index]);
+      return able ? light(index) : images[index];
+    },
+    /** Linear light at a pixel, or null. */
+    at(index, x, y) {
+      const found = codes.get(index);
+      if (!found) return null;
+      return [0, 1, 2].map((c) => lightOfCode[found[3 * (y * width + x) + c]]);
+    },
+  };
+}
+
+/** The image of a technique's error map, or null: truth has none. */
+function findMap(article, kind, label) {
+  const figure = [...article.querySelectorAll(".maps")].find((f) => f.dataset.kind === kind);
+  return figure ? [...figure.querySelectorAll("img")].find((image) => image.dataset.map === label) ?? null : null;
+}
