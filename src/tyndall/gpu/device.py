@@ -18,7 +18,7 @@ import logging
 import os
 import sys
 import tempfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -91,7 +91,14 @@ def adapters() -> list[wgpu.GPUAdapter]:
 
 
 def choose_adapter(name: str | None = None) -> wgpu.GPUAdapter:
-    """The adapter whose device name or backend contains ``name`` (any case), or else the best.
+    """The first of :func:`choose_adapters`."""
+    return choose_adapters(name)[0]
+
+
+def choose_adapters(name: str | None = None) -> list[wgpu.GPUAdapter]:
+    """The adapter of a name, and all others of this machine that are called the same.
+
+    It is the adapter whose device name or backend contains ``name`` (any case), or else the best.
 
     ``$TYNDALL_ADAPTER`` stands in for a ``name`` that is not given.
 
@@ -110,13 +117,18 @@ def choose_adapter(name: str | None = None) -> wgpu.GPUAdapter:
         best = found[0]
         if best.info["adapter_type"] == "CPU":
             log.warning("no GPU found: drawing with the software adapter %s", best.info["device"])
-        return best
+        return _alike(best, found)
     for adapter in found:
         info = adapter.info
         if name.lower() in f"{info['device']} {info['vendor']} {info['backend_type']} {info['adapter_type']}".lower():
-            return adapter
+            return _alike(adapter, found)
     known = ", ".join(f"'{a.info['device']}' ({a.info['backend_type']})" for a in found)
     raise GpuError(f"no adapter matches '{name}'{asked}; there are {known}")
+
+
+def _alike(adapter: wgpu.GPUAdapter, found: Sequence[wgpu.GPUAdapter]) -> list[wgpu.GPUAdapter]:
+    kind = ("device", "backend_type", "adapter_type")
+    return [other for other in found if all(other.info[key] == adapter.info[key] for key in kind)]
 
 
 @dataclass(frozen=True)
@@ -171,11 +183,18 @@ class Gpu(Closing):
     """A device with its caches, ledger and timers.
 
     Args:
-        adapter: part of an adapter's name; see :func:`choose_adapter`.
+        adapter: part of an adapter's name; see :func:`choose_adapters`.
+        rank: which of the adapters that are called the same, modulo their number, so that processes may share a
+            machine's GPUs out among themselves by their own numbers.
+
+    Attributes:
+        rank: its place among the adapters that are called the same.
     """
 
-    def __init__(self, adapter: str | None = None) -> None:
-        native = choose_adapter(adapter)
+    def __init__(self, adapter: str | None = None, *, rank: int = 0) -> None:
+        alike = choose_adapters(adapter)
+        self.rank = rank % len(alike)
+        native = alike[self.rank]
         self.adapter = native
         self.adapter_info: dict[str, Any] = dict(native.info)
         features = [f for f in _FEATURES if f in native.features]
@@ -191,6 +210,7 @@ class Gpu(Closing):
         self._samplers: dict[Any, Sampler] = {}
         self._constants: dict[int, Buffer] = {}
         self._encoder: Any = None
+        self._chain: Any = None
         self._timed = "timestamp-query" in self.features
         self._labels: list[str] = []
         if self._timed:
@@ -421,6 +441,18 @@ class Gpu(Closing):
         return ComputePass(self, label, module, entry)
 
     @contextlib.contextmanager
+    def chain(self, label: str) -> Iterator[None]:
+        """One compute pass of this name around all that is dispatched inside the block, in order, timed as one."""
+        encoder = self.encoder
+        stamps = self.timestamps(label)
+        self._chain = encoder.begin_compute_pass(label=label, **({"timestamp_writes": stamps} if stamps else {}))
+        try:
+            yield
+        finally:
+            self._chain.end()
+            self._chain = None
+
+    @contextlib.contextmanager
     def render(
         self,
         label: str,
@@ -504,7 +536,7 @@ class Gpu(Closing):
 
     def discard(self) -> None:
         """Forget the passes recorded since the last submit."""
-        self._encoder, self._labels = None, []
+        self._encoder, self._chain, self._labels = None, None, []
 
     def timings(self) -> list[tuple[str, float]]:
         """(name, milliseconds) of each pass of the last submit, and ("frame", first begin to last end). Waits for it.
@@ -652,42 +684,53 @@ class ComputePass:
 
     def dispatch(self, width: int, height: int = 1, depth: int = 1) -> None:
         """Run one thread for each element of the given size (rounded up to whole workgroups; the shader checks)."""
-        self._encode(lambda x, y, z: (-(-width // x), -(-height // y), -(-depth // z)))
+        prepared = self.prepare()
+        x, y, z = prepared.workgroup
+        prepared.run(-(-width // x), -(-height // y), -(-depth // z))
 
     def dispatch_line(self, count: int) -> None:
         """Run one thread for each of ``count`` elements, in rows of :data:`LINE` workgroups: the limit of one dimension
         is 65,535. The shader's index is ``(workgroup.y · LINE + workgroup.x) · size + local``.
         """
-        self._encode(lambda x, _y, _z: line_of(-(-count // x)))
+        self.prepare().line(count)
 
-    def dispatch_indirect(self, arguments: Buffer, offset: int = 0) -> None:
-        """Run as many workgroups as three ``u32`` of a buffer say, at a byte offset."""
-        self._encode(None, arguments, offset)
-
-    def _encode(
-        self,
-        groups: Callable[[int, int, int], tuple[int, int, int]] | None,
-        arguments: Buffer | None = None,
-        at: int = 0,
-    ) -> None:
+    def prepare(self) -> Prepared:
+        """The same pass, to be run many times at little cost."""
         gpu = self._gpu
         program = gpu._program(self._module, (self._entry,), self._bound, self._overlay, self._features, None)
         group = gpu._group(program, self._bound)
-        encoder = gpu.encoder
-        stamps = gpu.timestamps(self._label)
-        native = encoder.begin_compute_pass(label=self._label, **({"timestamp_writes": stamps} if stamps else {}))
-        native.set_pipeline(program.pipeline)
-        native.set_bind_group(0, group)
-        if groups is not None:
-            native.dispatch_workgroups(*groups(*gpu.linker.workgroup(self._module, self._entry)))
-        elif arguments is not None:
-            native.dispatch_workgroups_indirect(arguments.native, at)
-        native.end()
+        return Prepared(gpu, self._label, program.pipeline, group, gpu.linker.workgroup(self._module, self._entry))
 
 
-def line_of(groups: int) -> tuple[int, int, int]:
-    """That many workgroups, or a few more, in rows of no more than :data:`LINE`."""
-    return (min(max(groups, 1), LINE), max(1, -(-groups // LINE)), 1)
+@dataclass(frozen=True)
+class Prepared:
+    """A compute pass with its pipeline and bindings. It keeps what is bound alive, so it must not outlive that."""
+
+    gpu: Gpu
+    label: str
+    pipeline: Any
+    group: Any
+    workgroup: tuple[int, int, int]
+
+    def line(self, count: int) -> None:
+        """As :meth:`ComputePass.dispatch_line`."""
+        groups = max(1, -(-count // self.workgroup[0]))
+        self.run(min(groups, LINE), -(-groups // LINE))
+
+    def run(self, x: int, y: int = 1, z: int = 1) -> None:
+        """Run that many workgroups: in a pass of its own, or as part of the chain that is open."""
+        gpu = self.gpu
+        native = gpu._chain
+        if native is None:
+            stamps = gpu.timestamps(self.label)
+            native = gpu.encoder.begin_compute_pass(
+                label=self.label, **({"timestamp_writes": stamps} if stamps else {})
+            )
+        native.set_pipeline(self.pipeline)
+        native.set_bind_group(0, self.group)
+        native.dispatch_workgroups(x, y, z)
+        if gpu._chain is None:
+            native.end()
 
 
 def _all_bound(resources: Mapping[str, Any]) -> dict[str, Bound]:

@@ -68,6 +68,12 @@ class Slot:
     preamble: str = ""
     accessors: str = ""
 
+    def __hash__(self) -> int:
+        if (known := self.__dict__.get("_hash")) is None:  # a frame looks its pipelines up by their slots
+            known = hash((self.declaration, self.layout, self.visibility, self.preamble))
+            object.__setattr__(self, "_hash", known)
+        return known
+
     def entry(self, binding: int) -> dict[str, Any]:
         (kind, items) = self.layout[0]
         return {"binding": binding, "visibility": self.visibility, kind: dict(items)}

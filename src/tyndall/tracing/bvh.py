@@ -11,15 +11,17 @@ placed once, in world space. All groups are built at once: the group is above th
 of different groups never merge. Then the same steps cluster the instances, whose boxes are those of their groups'
 roots, into the upper tree. What is in world space already hangs in it without a transform.
 
-**Practice.** Nothing is read back while a step runs: a step says by an indirect dispatch how large the next one is.
-Nodes are numbered in the order of the steps, so a child precedes its parent, and moving instances is a refit: the upper
-tree's nodes, step by step. Equal input gives the same tree on every device. Buffers beyond an adapter's limit of a
-binding are bound in parts. A tree deeper than the traversal's stack (triangles of exponentially growing size) is built
-again by pairing neighbours on the curve, whatever their boxes, which has logarithmic depth.
+**Practice.** Steps are dispatched for as many clusters as were left when the host last looked: after two, four, eight
+steps and so on, since a look costs more than a few empty workgroups. Nodes are numbered in the order of the steps, so a
+child precedes its parent, and moving instances is a refit: the upper tree's nodes, step by step. Equal input gives the
+same tree on every device. Buffers beyond an adapter's limit of a binding are bound in parts. A tree deeper than the
+traversal's stack (triangles of exponentially growing size) is built again by pairing neighbours on the curve, whatever
+their boxes, which has logarithmic depth.
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -27,7 +29,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tyndall.gpu.device import Gpu, GpuError, line_of
+from tyndall.gpu.device import Gpu, GpuError, Prepared
 from tyndall.gpu.resources import Buffer, Closing, Parts, Resource
 
 OWNER = "tracing"
@@ -38,8 +40,9 @@ _BUILD = "package::tracing::build"
 _SORT = "package::tracing::sort"
 _THREADS = 256
 _BLOCK = 1024  # keys of a block of the sort
-_STEPS = 24  # encoded between two looks at how far it has come
+_LOOKS = (2, 2, 4)  # steps between looks at how far it has come; then 8
 _PATIENCE = 96  # steps before pairing
+_MOST = 2 * _PATIENCE  # pairing halves what is left at every other step
 
 
 @dataclass(frozen=True)
@@ -71,9 +74,10 @@ class Clustering(Closing):
         self._clusters = [made(f"clusters{i}", size * leaves, cluster) for i in range(2)]
         self._neighbours = made("neighbours", 4 * leaves, "u32")
         self._blocks = made("blocks", 8 * -(-leaves // _THREADS), "vec2u")
-        self._progress = made("progress", 8 * (2 * _PATIENCE + 2), f"{_BUILD}::Progress")
-        self._arguments = made("arguments", 12 * (2 * _PATIENCE + 2), "u32", "storage indirect")
-        self._deepest = made("deepest", np.zeros(4, np.uint32), "atomic<u32>")
+        self._progress = made("progress", 16, f"{_BUILD}::Progress")
+        self._history = made("history", 4 * (_MOST + 16), "u32")
+        self._deepest = made("deepest", 4, "atomic<u32>")
+        self._digits = made("digit", 8, "u32")
 
     def _buffer(self, label: str, data: NDArray[Any] | int, element: str, usage: str = "storage") -> Buffer:
         buffer = self._gpu.buffer(f"tracing.build.{label}", data, owner=OWNER, element=element, usage=usage)
@@ -90,20 +94,26 @@ class Clustering(Closing):
         # 48 bits of the curve, and of the group as many as there are.
         digits = 12 + -(-(self._groups - 1).bit_length() // 4)
         blocks = -(-leaves // _BLOCK)
-        for digit in range(digits):
-            source, target = digit % 2, (digit + 1) % 2
+        gpu.write(self._digits, np.zeros(2, np.uint32))
+        rounds = []
+        for source, target in ((0, 1), (1, 0)):
             bound = {
                 "keys_in": self._keys[source],
                 "keys_out": self._keys[target],
                 "values_in": self._values[source],
                 "values_out": self._values[target],
                 "digit_counts": self._counts.read_write(),
+                "digits": self._digits.read_write(),
                 "key_count": count,
-                "digit": gpu.constant(digit),
             }
-            gpu.compute("tracing.sort", _SORT, "sort_count").bind(bound).dispatch_line(blocks * _THREADS)
-            gpu.compute("tracing.sort", _SORT, "sort_scan").bind(bound).dispatch(1)
-            gpu.compute("tracing.sort", _SORT, "sort_scatter").bind(bound).dispatch_line(blocks * _THREADS)
+            names = ("sort_count", "sort_scan", "sort_scatter")
+            rounds.append([gpu.compute("tracing.sort", _SORT, name).bind(bound).prepare() for name in names])
+        with gpu.chain("tracing.sort"):
+            for digit in range(digits):
+                counting, scan, scatter = rounds[digit % 2]
+                counting.line(blocks * _THREADS)
+                scan.run(1)
+                scatter.line(blocks * _THREADS)
         self._order = self._values[digits % 2]
 
     def cluster(self, entry: str, scope: Mapping[str, Any], *, paired: bool = False) -> tuple[Parts, Steps]:
@@ -117,56 +127,52 @@ class Clustering(Closing):
         gpu.compute("tracing.leaves", _BUILD, entry).bind(
             scope, values_in=self._order, clusters_out=clusters[0][1], leaf_count=leaf_count
         ).dispatch_line(self._leaves)
-        rows = np.zeros(2 * _PATIENCE + 2, self._progress.dtype)
-        rows[0] = (self._leaves, self._first)
-        gpu.write(self._progress, rows)
-        gpu.write(self._arguments, np.array(line_of(-(-self._leaves // _THREADS)), np.uint32))
-        gpu.write(self._deepest, np.zeros(4, np.uint32))
-        step = 0
-        left = self._leaves
+        start = np.zeros(2, self._progress.dtype)
+        start[0] = (self._leaves, self._first)
+        gpu.write(self._progress, start)
+        gpu.write(self._history, np.zeros(1, np.uint32))
+        gpu.write(self._deepest, np.zeros(1, np.uint32))
+        steps = {mode: [self._prepare(parity, clusters, mode) for parity in range(2)] for mode in ("nearest", "pair")}
+        left, step = self._leaves, 0
+        looks = itertools.chain(_LOOKS, itertools.repeat(8))
         while left > self._groups:
-            end = step + _STEPS
-            if end > 2 * _PATIENCE:
-                raise GpuError(
-                    f"tracing: {left} clusters are left of {self._leaves} leaves"
-                )  # cannot be: pairing halves
-            while step < end:
-                self._step(step, clusters, paired or step >= _PATIENCE)
-                step += 1
-            left = int(gpu.read_buffer(self._progress)["clusters"][step])
-        progress = gpu.read_buffer(self._progress)[: step + 1] if step else rows[:1]
+            if step > _MOST:
+                raise GpuError(f"tracing: {left} clusters are left of {self._leaves} leaves after {step} steps")
+            mode = "pair" if paired or step >= _PATIENCE else "nearest"
+            with gpu.chain("tracing.cluster"):
+                for _ in range(next(looks)):
+                    choose, count, scan, merge = steps[mode][step % 2]
+                    choose.line(left)
+                    count.line(left)
+                    scan.run(1)
+                    merge.line(left)
+                    step += 1
+            left = int(gpu.read_buffer(self._progress)["clusters"][step % 2])
+        nodes = gpu.read_buffer(self._history)[1 : step + 1]
         depth = int(gpu.read_buffer(self._deepest)[0])
-        starts = tuple(int(n) for n in np.unique(progress["nodes"]))
+        starts = tuple(int(n) for n in np.unique([self._first, *nodes]))
         return clusters[step % 2][0], Steps(starts, depth)
 
-    def _step(self, step: int, clusters: list[tuple[Parts, Parts]], paired: bool) -> None:
+    def _prepare(self, parity: int, clusters: list[tuple[Parts, Parts]], mode: str) -> list[Prepared]:
+        """A step that reads the clusters of one parity and writes those of the other."""
         gpu = self._gpu
         bound = {
-            "clusters_in": clusters[step % 2][0],
-            "clusters_out": clusters[(step + 1) % 2][1],
-            "neighbours": self._neighbours.split(),
+            "clusters_in": clusters[parity][0],
+            "clusters_out": clusters[1 - parity][1],
             "blocks": self._blocks.read_write(),
             "progress": self._progress.read_write(),
-            "arguments": self._arguments.read_write(),
+            "history": self._history.read_write(),
             "deepest": self._deepest.read_write(),
             "trace_nodes": self._nodes.split(write=True),
-            "step": gpu.constant(step),
+            "parity": gpu.constant(parity),
             "radius": gpu.constant(RADIUS),
-            "pairing": gpu.constant(step % 2),
         }
-        choose = {**bound, "neighbours": self._neighbours.split(write=True)}
-        at = 12 * step
-
-        def run(entry: str, scope: Mapping[str, Any]) -> None:
-            gpu.compute("tracing.cluster", _BUILD, entry).bind(scope).dispatch_indirect(self._arguments, at)
-
-        del bound["arguments"]
-        run("pair" if paired else "nearest", {k: v for k, v in choose.items() if k != "arguments"})
-        run("count_merges", bound)
-        gpu.compute("tracing.cluster", _BUILD, "scan_merges").bind(
-            bound, arguments=self._arguments.read_write()
-        ).dispatch(1)
-        run("merge", bound)
+        return [
+            gpu.compute("tracing.cluster", _BUILD, entry)
+            .bind(bound, neighbours=self._neighbours.split(write=entry == mode))
+            .prepare()
+            for entry in (mode, "count_merges", "scan_merges", "merge")
+        ]
 
     def resources(self) -> list[Resource]:
         """What the build holds on the device."""
