@@ -132,13 +132,15 @@ class Clustering(Closing):
         gpu.write(self._progress, start)
         gpu.write(self._history, np.zeros(1, np.uint32))
         gpu.write(self._deepest, np.zeros(1, np.uint32))
-        steps = {mode: [self._prepare(parity, clusters, mode) for parity in range(2)] for mode in ("nearest", "pair")}
+        steps: dict[str, list[list[Prepared]]] = {}
         left, step = self._leaves, 0
         looks = itertools.chain(_LOOKS, itertools.repeat(8))
         while left > self._groups:
             if step > _MOST:
                 raise GpuError(f"tracing: {left} clusters are left of {self._leaves} leaves after {step} steps")
             mode = "pair" if paired or step >= _PATIENCE else "nearest"
+            if mode not in steps:
+                steps[mode] = [self._prepare(parity, clusters, mode) for parity in range(2)]
             with gpu.chain("tracing.cluster"):
                 for _ in range(next(looks)):
                     choose, count, scan, merge = steps[mode][step % 2]
