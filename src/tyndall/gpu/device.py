@@ -722,10 +722,9 @@ class Prepared:
         gpu = self.gpu
         native = gpu._chain
         if native is None:
+            encoder = gpu.encoder  # a new one begins a new list of timers
             stamps = gpu.timestamps(self.label)
-            native = gpu.encoder.begin_compute_pass(
-                label=self.label, **({"timestamp_writes": stamps} if stamps else {})
-            )
+            native = encoder.begin_compute_pass(label=self.label, **({"timestamp_writes": stamps} if stamps else {}))
         native.set_pipeline(self.pipeline)
         native.set_bind_group(0, self.group)
         native.dispatch_workgroups(x, y, z)
