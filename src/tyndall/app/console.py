@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
 _WIDE = 150
 _HOLD_SECONDS = 2.0
+_ESTIMATE_SECONDS = 600.0  # what the remaining time is judged by: parts may take minutes
 _MOST_LINES = 9
 
 
@@ -24,10 +25,10 @@ def print_result(renderable: RenderableType | str) -> None:
     Console(width=None if sys.stdout.isatty() else _WIDE, highlight=False, soft_wrap=False).print(renderable)
 
 
-def say(text: str) -> None:
-    """Lines on stderr; of many, the first ones, and how many more there are."""
+def say(text: str, *, every: bool = False) -> None:
+    """Lines on stderr; of many, the first ones, and how many more there are, or ``every`` one."""
     lines = text.splitlines()
-    if len(lines) > _MOST_LINES + 1:
+    if not every and len(lines) > _MOST_LINES + 1:
         lines[_MOST_LINES:] = [f"… and {len(lines) - _MOST_LINES} more"]
     for line in lines:
         print(f"tyndall: {line}", file=sys.stderr)
@@ -38,20 +39,32 @@ class Work:
 
     The project's notes ("drawing with the software adapter …") and warnings are held back until the work has gone on
     for a while, or has ended well: where it fails at once, its error is the only line.
+
+    Args:
+        title: what is being done.
+        remaining: show how long it will take, from what it took so far; for work in parts of about equal length.
     """
 
-    def __init__(self, title: str) -> None:
-        self._title = title
+    def __init__(self, title: str, *, remaining: bool = False) -> None:
+        self._title, self._remaining = title, remaining
         self._notes: list[str] = []
         self._begun = time.monotonic()
 
     def __enter__(self) -> Self:
         from rich.console import Console
-        from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+        from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
         console = Console(stderr=True)
         columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:>3.0f} %"))
-        progress = Progress(*columns, TimeElapsedColumn(), console=console, transient=True)
+        ending = (TextColumn("left"), TimeRemainingColumn()) if self._remaining else ()
+        progress = Progress(
+            *columns,
+            TimeElapsedColumn(),
+            *ending,
+            console=console,
+            transient=True,
+            speed_estimate_period=_ESTIMATE_SECONDS,
+        )
         self._task = progress.add_task(self._title, total=1.0)
         self._progress = progress
         self._console = console

@@ -48,7 +48,7 @@ Plain = dict[str, Any]
 Location = tuple[str | int, ...]
 
 _SIZE = re.compile(r"([+-]?\d{1,9})\s*[x×X*]\s*([+-]?\d{1,9})")
-_MEMBERS = {name: cls for family in FAMILIES.values() for name, cls in family.members.items()}
+MEMBERS = {name: cls for family in FAMILIES.values() for name, cls in family.members.items()}
 _MOST_POINTS = 100_000
 
 OTHERS = tuple(family for family in FAMILIES if family != "volumetric")
@@ -189,7 +189,8 @@ def plan(
     if isinstance(spec, Mapping):
         for loc, given, raw in _raw_parts(spec):
             for place, message in scenes.mistakes(raw):
-                wrong.setdefault((*loc, *place) if place[0] in given else place, []).append(message)
+                inherited = place[0] in raw and place[0] not in given
+                wrong.setdefault(place if inherited else (*loc, *place), []).append(message)
     if record is not None:
         for loc, message in _undrawn(record):
             wrong.setdefault(loc, []).append(message)
@@ -325,18 +326,22 @@ def _is_size(value: Any) -> bool:
     return isinstance(value, (list, tuple)) and len(value) == 2 and all(isinstance(side, int) for side in value)
 
 
-def _takes_list(tp: Any) -> bool:
-    return get_origin(tp) is tuple or (get_origin(tp) in (Union, UnionType) and any(map(_takes_list, get_args(tp))))
+def takes_list(tp: Any) -> bool:
+    return get_origin(tp) is tuple or (get_origin(tp) in (Union, UnionType) and any(map(takes_list, get_args(tp))))
 
 
 def _values(f: Field) -> Callable[[Any], tuple[Any, ...]]:
     """One value of a parameter, or a list of values; a grid of ``[64, 36, 32]`` or ``"64x36x32"`` is one value."""
-    wide = _takes_list(f.type)
+    wide = takes_list(f.type)
 
     def one(value: Any) -> Any:
-        if wide and isinstance(value, str) and re.search("[x×]", value):
-            value = re.split("[x×]", value)
-        return _converted(f, value)
+        if not (wide and isinstance(value, str) and re.search("[x×]", value)):
+            return _converted(f, value)
+        parts = re.split("[x×]", value)
+        try:
+            return _converted(f, parts)
+        except ParameterError as error:
+            raise ParameterError(str(error).replace(repr(parts), repr(value))) from error
 
     return _each(one, lambda items: wide and bool(items) and not any(isinstance(i, (list, tuple, str)) for i in items))
 
@@ -379,7 +384,7 @@ def _choice(family: str) -> Callable[[Any], Choice]:
         wrong.at("technique", FAMILIES[family].find, name)
         wrong.raise_any()
         own = {p: v for p, v in value.items() if p != "technique"}
-        return Choice(name, _parameters_of(_MEMBERS[name], name, own))
+        return Choice(name, _parameters_of(MEMBERS[name], name, own))
 
     return check
 
@@ -388,9 +393,9 @@ def _parameters(value: Any) -> dict[str, dict[str, tuple[Any, ...]]]:
     wrong = _Gathered()
 
     def check(name: str, values: Any) -> dict[str, tuple[Any, ...]]:
-        if name not in _MEMBERS:
-            raise ParameterError(f"no technique '{name}'{nearest(name, _MEMBERS)}")
-        return _parameters_of(_MEMBERS[name], name, _object(values))
+        if name not in MEMBERS:
+            raise ParameterError(f"no technique '{name}'{nearest(name, MEMBERS)}")
+        return _parameters_of(MEMBERS[name], name, _object(values))
 
     made = {n: wrong.at(n, partial(check, n), values) for n, values in _object(value).items()}
     wrong.raise_any()
@@ -428,7 +433,7 @@ def _truth(value: Any) -> Plain | None:
             wrong.note("shadow", "a judge has one shadow technique")
         elif chosen is not None:
             one = {name: values[0] for name, values in chosen.values.items()}
-            made["shadow"] = _plain(replace(_MEMBERS[chosen.name](), one))
+            made["shadow"] = _plain(replace(MEMBERS[chosen.name](), one))
     made |= wrong.over(partial(_settings, judge_settings(judge)), given) or {}
     wrong.raise_any()
     return made
@@ -535,7 +540,7 @@ class _Scenes:
     def mistakes(self, part: Mapping[str, Any]) -> Iterator[tuple[Location, str]]:
         """What is wrong with the scenes of a part as it was written; fields of another kind are passed over."""
         names, counts = _listed(part.get("scenes")), _listed(part.get("lights"))
-        if not names:
+        if part.get("scenes") is None:
             yield ("scenes",), "is missing"
         for i, name in names:
             if not isinstance(name, str) or not name:

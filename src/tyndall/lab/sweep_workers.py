@@ -34,6 +34,7 @@ Plain = dict[str, Any]
 _PATIENCE_S = 5.0
 _POLL_S = 0.5
 _START_S = 60.0
+_CONNECT_S = 10.0
 _CHILD = "from tyndall.lab.sweep_point import serve; serve()"
 _DASK = "from tyndall.lab.sweep_workers import serve; serve()"
 
@@ -365,7 +366,7 @@ def remote_workers(address: str) -> Iterator[list[tuple[Worker, int]]]:
 
     parts: Any = distributed  # whose constructors have no types
     try:
-        client = parts.Client(address, timeout=10, set_as_default=False)
+        client = parts.Client(address, timeout=_CONNECT_S, set_as_default=False)
     except (OSError, ValueError, TypeError) as error:
         raise ParameterError(f"scheduler: no Dask scheduler answers at {address}") from error
     with client:
