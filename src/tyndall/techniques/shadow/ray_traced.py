@@ -46,7 +46,12 @@ class RayTraced(Technique):
     map_size: int = param(1024, 16, 16384, "width and height of a map, if maps are drawn", unit="texel", rebuild=True)
 
     def render(self, view: View, content: Sequence[Any]) -> Visibility:
-        """Trace every light, and draw maps where they are read."""
+        """Trace every light, and draw maps where they are read. Without content all light passes, as through an
+        empty map.
+        """
+        if not content:
+            empty = ShadowMap(size=16)
+            return empty.render(view.part(empty), content)
         lights = view.scene.lights
         world = view.world.bindings
         soft = [_is_soft(light) for light in lights]
