@@ -15,6 +15,7 @@ LEAVES = {
     "own_scene": ["pyramid.json", "pyramid.png"],
     "orbit": ["orbit.webp"],
     "cost_of_lights": [],
+    "sweep_grids": ["sweep"],
 }
 
 
