@@ -18,9 +18,11 @@ if TYPE_CHECKING:
     from tyndall.frame import Renderer
     from tyndall.gpu.device import GpuError
     from tyndall.gpu.params import ParameterError
-    from tyndall.lab.compare import Comparison, compare
+    from tyndall.lab.compare import compare
+    from tyndall.lab.comparison import Comparison
     from tyndall.lab.picture import Picture
     from tyndall.lab.render import render
+    from tyndall.lab.sweep import Sweep, SweepError, sweep
     from tyndall.scene import bundled as scenes
     from tyndall.scene.errors import SceneError
     from tyndall.scene.files import load, save
@@ -82,6 +84,8 @@ __all__ = [
     "ScreenSpace",
     "ShadowMap",
     "SpotLight",
+    "Sweep",
+    "SweepError",
     "Taa",
     "Texture",
     "__version__",
@@ -91,6 +95,7 @@ __all__ = [
     "save",
     "scenes",
     "stage",
+    "sweep",
 ]
 
 # Where the public names live, the light modules first.
@@ -109,6 +114,7 @@ _HOMES = (
     "tyndall.lab.picture",
     "tyndall.lab.render",
     "tyndall.lab.compare",
+    "tyndall.lab.sweep",
 )
 
 

@@ -279,6 +279,12 @@ class Renderer(Closing):
         self._previous = row["still_view_proj"]
         self.gpu.write(self._camera, row)
 
+    def dim(self, factor: float) -> None:
+        """From the next frame on, all lights shine with this factor of their intensity, ≥ 0; what is ambient stays."""
+        rows = pack_lights(self.scene, self.gpu.dtype(_LIGHT))
+        rows["intensity"] *= np.float32(factor)
+        self.gpu.write(self._lights, rows)
+
     def restart(self) -> None:
         """Forget temporal history: the next frame is like the first."""
         self._frame = self._history = 0

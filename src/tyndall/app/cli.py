@@ -11,18 +11,23 @@ import errno
 import io
 import json
 import os
+import shlex
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 from typer.exceptions import TyperException
 
 from tyndall import __version__
-from tyndall.app import arguments, console
+from tyndall.app import arguments, console, report_command, sweep_command
 from tyndall.app.arguments import Overrides
-from tyndall.gpu.params import ParameterError, fields_of, nearest
+from tyndall.gpu.params import ParameterError, fields_of, nearest, replace
+
+if TYPE_CHECKING:
+    from tyndall.lab.truth import TruthSettings
 from tyndall.lab.scenes import open_scene
 
 DONE, FAULT, MISTAKE, INTERRUPTED = 0, 1, 2, 130
@@ -38,6 +43,8 @@ app = typer.Typer(
 )
 bench = typer.Typer(help="Measure the techniques against this project's figures.")
 app.add_typer(bench, name="bench")
+app.command()(report_command.report)
+app.command()(sweep_command.sweep)
 
 SceneName = Annotated[str, typer.Argument(metavar="SCENE", help="A bundled scene, a scene JSON, or a mesh file.")]
 Size = Annotated[str, typer.Option(metavar="WxH", help="Width and height of the picture in pixels.")]
@@ -57,6 +64,17 @@ Out = Annotated[Path | None, typer.Option(metavar="DIR", help="Folder for the re
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on stdout, and nothing else there.")]
 
 
+_DRAWING = ("render", "compare", "sweep")  # commands that take parameters of techniques
+
+
+@dataclass(frozen=True)
+class Given:
+    """What a command finds in its context: ``--technique.parameter`` flags, and the whole command line as one line."""
+
+    flags: list[tuple[str, str, str]]
+    command: str
+
+
 @app.callback(invoke_without_command=True)
 def _global(
     context: typer.Context,
@@ -67,8 +85,9 @@ def _global(
     if version:
         print(f"tyndall {__version__}")
         raise typer.Exit
-    if context.obj and context.invoked_subcommand not in (render.__name__, compare.__name__):
-        technique, parameter, _ = context.obj[0]
+    given: Given = context.obj
+    if given.flags and context.invoked_subcommand not in _DRAWING:
+        technique, parameter, _ = given.flags[0]
         raise ParameterError(f"--{technique}.{parameter}: {context.invoked_subcommand} draws nothing with it")
 
 
@@ -97,11 +116,11 @@ def render(
         raise ParameterError(f"--technique: '{technique}' is not one technique; compare draws several")
     technique = names[0]
     families = {"volumetric": technique, **_others(shadow=shadow, antialiasing=antialiasing, tonemap=tonemap)}
-    parameters = _parameters(context, [technique], families, model)
+    parameters = _parameters(context.obj.flags, "volumetric", [technique], families, model)
     with console.Work("loading") as work:
         described = open_scene(scene, lights)
         folder = out or Path("out", Path(scene).stem)  # not the name in a file, which may be a path
-        from tyndall.lab.compare import check_folder
+        from tyndall.lab.picture import check_folder
         from tyndall.lab.render import render as draw
 
         check_folder(folder)
@@ -136,20 +155,33 @@ def compare(
     scene: SceneName,
     *,
     size: Size = "1280x720",
+    family: Annotated[
+        Literal["volumetric", "shadow"], typer.Option(help="Whose techniques are compared.")
+    ] = "volumetric",
     technique: Annotated[
         list[str] | None,
-        typer.Option(metavar="NAMES", help="Volumetric techniques, separated by commas; all if not given."),
+        typer.Option(metavar="NAMES", help="Techniques of the family, separated by commas; all if not given."),
     ] = None,
-    shadow: Shadow = None,
+    volumetric: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Volumetric technique, where shadows are compared.")
+    ] = None,
+    shadow: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Shadow technique, where volumetric light is compared.")
+    ] = None,
     antialiasing: Antialiasing = None,
     tonemap: Tonemap = None,
     model: Annotated[
         Literal["paper", "physical", "both"] | None,
         typer.Option(help="As the techniques' papers have it, or single scattering in the scene's medium, or both."),
     ] = None,
-    reference: Annotated[str, typer.Option(metavar="NAME", help="What errors are against; `none` for no errors.")] = (
-        "march"
-    ),
+    truth: Annotated[
+        Literal["traced", "march", "mitsuba", "none"],
+        typer.Option(
+            help="What errors are against: traced rays; a converged march in the same shadow map; Mitsuba 3; nothing. "
+            "--truth.target 0.01 (1 % standard error), --truth.seconds 20, --truth.samples and --truth.depth say when "
+            "it is good enough, and what it holds."
+        ),
+    ] = "traced",
     lights: Lights = None,
     frames: Annotated[
         int | None, typer.Option(metavar="N", min=1, help="Frames to measure; 64, or fewer on a slow adapter.")
@@ -160,18 +192,26 @@ def compare(
     adapter: AdapterName = None,
     seed: Seed = 0,
     out: Out = None,
+    report: Annotated[
+        bool, typer.Option("--report", help="Write report.html there too: all of it on one page.")
+    ] = False,
     as_json: Json = False,
 ) -> None:
-    """Light the same view by several techniques: time, memory, and error against a converged reference."""
+    """Light the same view by several techniques: time, memory, and error against a truth."""
     from tyndall.techniques import FAMILIES
 
     pixels = arguments.parse_size(size)
     chosen = arguments.split_list(technique) if technique else None
     if chosen == []:
         raise ParameterError("--technique: no name is given")
-    against = None if reference == "none" else reference
-    others = _others(shadow=shadow, antialiasing=antialiasing, tonemap=tonemap)
-    parameters = _parameters(context, chosen or list(FAMILIES["volumetric"].members), others)
+    others = _others(volumetric=volumetric, shadow=shadow, antialiasing=antialiasing, tonemap=tonemap)
+    if family in others:
+        raise ParameterError(f"--{family}: it is {family} techniques that are compared; --technique names them")
+    if model is not None and family != "volumetric":
+        raise ParameterError("--model: only volumetric techniques have models")
+    settings, flags = _truth_settings(context)
+    parameters = _parameters(flags, family, chosen or list(FAMILIES[family].members), others)
+    techniques: dict[str, Any] = {**others, family: chosen}
     with console.Work("loading") as work:
         described = open_scene(scene, lights)
         folder = out or Path("out", Path(scene).stem)  # not the name in a file, which may be a path
@@ -180,23 +220,28 @@ def compare(
         comparison = measure(
             described,
             size=pixels,
-            volumetric=chosen,
+            family=family,
             model=model,
             parameters=parameters,
-            reference=against,
+            truth=truth,
+            truth_settings=settings,
             frames=frames,
             warmup=warmup,
             out=folder,
             adapter=adapter,
             seed=seed,
             progress=work.advance,
-            **others,
+            command=context.obj.command,
+            **techniques,
         )
+        page = comparison.report(folder) if report else None
     if as_json:
         print(json.dumps(comparison.to_json(), indent=2))
     else:
         console.print_result(comparison.table())
         print(f"pictures and results.json are in {folder}")
+        if page:
+            print(f"the report is {page}")
 
 
 @app.command()
@@ -278,7 +323,8 @@ def main(words: Sequence[str] | None = None) -> int:
     words = [word for word in words if word != "--debug"]
     try:
         rest, flags = arguments.split_flags(words)
-        code = app(rest or ["--help"], prog_name="tyndall", standalone_mode=False, obj=flags)
+        given = Given(flags, shlex.join(["tyndall", *words]))
+        code = app(rest or ["--help"], prog_name="tyndall", standalone_mode=False, obj=given)
         sys.stdout.flush()
     except KeyboardInterrupt:
         return INTERRUPTED
@@ -316,30 +362,47 @@ def _others(**chosen: str | None) -> dict[str, str]:
     return {family: name.replace("-", "_") for family, name in chosen.items() if name is not None}
 
 
+def _truth_settings(context: typer.Context) -> tuple[TruthSettings | None, list[tuple[str, str, str]]]:
+    """The settings of the truth from ``--truth.name value`` flags, None without any; and the other flags."""
+    from tyndall.lab.standard import DEFAULT_SETTINGS
+    from tyndall.lab.truth import TruthSettings
+
+    given: Given = context.obj
+    wanted = [flag for flag in given.flags if flag[0] == "truth"]
+    others = [flag for flag in given.flags if flag[0] != "truth"]
+    changes = arguments.convert_flags(wanted, {"truth": TruthSettings})
+    return (replace(DEFAULT_SETTINGS, changes["truth"]) if changes else None), others
+
+
 def _parameters(
-    context: typer.Context, volumetric: list[str], others: Mapping[str, str], model: str | None = None
+    flags: Iterable[tuple[str, str, str]],
+    family: str,
+    compared: list[str],
+    others: Mapping[str, str],
+    model: str | None = None,
 ) -> Overrides:
     """Parameter values by technique name, from ``--technique.parameter`` flags and, where it is given, ``--model``.
 
-    All names and values are tried out here, before a scene is loaded or a device is woken.
+    ``compared`` are the names of a family, ``others`` one of other families each. All names and values are tried out
+    here, before a scene is loaded or a device is woken.
     """
     from tyndall.techniques import FAMILIES
 
     members = {name: member for family in FAMILIES.values() for name, member in family.members.items()}
-    chosen = [("volumetric", name) for name in volumetric]
-    chosen += [(f, others.get(f, family.default)) for f, family in FAMILIES.items() if f != "volumetric"]
-    for family, name in chosen:
-        FAMILIES[family].find(name)
-    parameters = arguments.convert_flags(context.obj, members)
+    chosen = [(family, name) for name in compared]
+    chosen += [(f, others.get(f, known.default)) for f, known in FAMILIES.items() if f != family]
+    for where, name in chosen:
+        FAMILIES[where].find(name)
+    parameters = arguments.convert_flags(flags, members)
     for name, values in parameters.items():
         if name not in {used for _, used in chosen}:
             raise ParameterError(
                 f"--{name}.{next(iter(values))}: '{name}' is not drawn here; choose it with its family"
             )
     if model is not None:
-        switched = [name for name in volumetric if any(f.name == "model" for f in fields_of(members[name]))]
+        switched = [name for name in compared if any(f.name == "model" for f in fields_of(members[name]))]
         if not switched:
-            raise ParameterError(f"--model: '{volumetric[0]}' has one model only")
+            raise ParameterError(f"--model: '{compared[0]}' has one model only")
         for name in switched:
             parameters.setdefault(name, {}).setdefault("model", model)
     return parameters

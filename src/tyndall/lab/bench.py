@@ -29,10 +29,9 @@ from numpy.typing import NDArray
 from tyndall.gpu.device import Gpu, GpuError
 from tyndall.gpu.params import replace
 from tyndall.lab import bench_tables, metrics
-from tyndall.lab.compare import check_folder
 from tyndall.lab.fingerprint import scene_hash, versions
 from tyndall.lab.measure import Measurement, measure
-from tyndall.lab.picture import write_atomically
+from tyndall.lab.picture import check_folder, write_atomically
 from tyndall.lab.reference import Reference, find
 from tyndall.lab.stage import Overrides, Stage, adapter_name, describe, driver_name, make
 from tyndall.scene import bundled

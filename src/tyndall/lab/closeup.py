@@ -1,6 +1,6 @@
 """Where a technique goes wrong, as one picture: the whole view, then crops of the places of largest error.
 
-Each row shows the reference, the technique, and the error of its in-scattered light ``L_v`` as heat; the first row is
+Each row shows the reference, the technique, and the error of its light (``L_v``, say) as heat; the first row is
 the whole view with the places framed, the rows below magnify them without smoothing. The heat's scale is rounded up to
 1, 2 or 5 times a power of ten, so that it can be read off.
 """
@@ -79,19 +79,19 @@ def heat(error: NDArray[np.float32], scale: float) -> Pixels:
     return np.stack(channels, axis=-1).round().astype(np.uint8)
 
 
-def strip(reference: Pixels, technique: Pixels, error: NDArray[np.float32], names: tuple[str, str]) -> Pixels:
+def strip(reference: Pixels, technique: Pixels, error: NDArray[np.float32], names: tuple[str, str, str]) -> Pixels:
     """One picture of it all, (…, 3) uint8.
 
     Args:
         reference, technique: final pictures of one size, (H, W, 3).
-        error: (H, W), relative to the mean of the reference's ``L_v`` (:func:`tyndall.lab.metrics.error_map`).
-        names: titles of the first two columns.
+        error: (H, W), relative to the mean of the reference's light (:func:`tyndall.lab.metrics.error_map`).
+        names: titles of the first two columns, and the symbol of the light whose error it is.
     """
     from PIL import Image, ImageDraw, ImageFont
 
     scale = nice_ceiling(float(np.quantile(error, 0.995)))
     columns = (reference, technique, heat(error, scale))
-    titles = (*names, f"error of L_v: black 0, white {100 * scale:g} % of the mean")
+    titles = (*names[:2], f"error of {names[2]}: black 0, white {100 * scale:g} % of the mean")
     places = worst_places(error)
     rows: list[tuple[Pixels, ...]] = [columns]
     rows += [tuple(place.crop(column) for column in columns) for place in places]

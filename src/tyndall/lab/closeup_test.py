@@ -55,7 +55,7 @@ def test_the_strip_shows_both_pictures_and_magnifies_the_worst_place() -> None:
     technique = np.full((90, 160, 3), (200, 0, 0), np.uint8)
     error = np.zeros((90, 160), np.float32)
     error[30:40, 50:60] = 1
-    picture = strip(reference, technique, error, ("march", "froxel"))
+    picture = strip(reference, technique, error, ("march", "froxel", "L_v"))
     height, width = picture.shape[:2]
     lower = picture[height * 3 // 4]  # through the magnified crops
     assert tuple(lower[width // 6]) == (0, 200, 0)

@@ -8,6 +8,7 @@ transfer curve hides or exaggerates them. With ``x`` the picture, ``r`` the refe
   ``sqrt(mean(r²)) / m ≥ 1``.
 - ``rel_rmse_corrected = sqrt(max(0, mse − mean(se²))) / m`` where the reference has a known standard error ``se``: the
   expected square of its noise is taken off, so that ``mse − mean(se²)`` is unbiased for the technique's own error.
+  ``rel_rmse_limit`` is the error that noise might hide (:func:`hidden`), and ``within_noise`` says that it hides all.
 - ``relmse = mean((x − r)² / (r² + ε))``: every pixel relative to itself, so that dark parts count. ε = 0.01·m², which
   is the 0.01 of Rousselle, Knaus and Zwicker (2011, *Adaptive sampling and reconstruction using greedy error
   minimization*) for a picture whose mean is 1.
@@ -76,13 +77,16 @@ class Scores:
     so, a line each).
 
     Attributes:
-        within_noise: the reference cannot tell the picture from right: the error that is left when the reference's
-            noise is taken off is no larger than that noise.
+        within_noise: the reference cannot tell the picture from right: what is left of the mean square error when the
+            reference's noise is taken off is less than three times its own standard error.
+        rel_rmse_limit: by the same three standard errors, the largest error that the picture may have; None where the
+            reference has no noise.
     """
 
     rmse: float
     rel_rmse: float | None
     rel_rmse_corrected: float | None
+    rel_rmse_limit: float | None
     within_noise: bool
     relmse: float | None
     psnr: float | None
@@ -110,7 +114,7 @@ def score(image: Light, target: Target) -> Scores:
         ValueError: the shapes differ, or a value is not finite.
     """
     r, error = target.light, target.error
-    plain, corrected, noise = rel_rmse(image, r), rel_rmse(image, r, error), relative_noise(r, error)
+    limit = hidden(image, r, error) if error is not None else None
     missing: list[str] = []
 
     def optional(metric: Any) -> float | None:
@@ -123,9 +127,10 @@ def score(image: Light, target: Target) -> Scores:
 
     return Scores(
         rmse=rmse(image, r),
-        rel_rmse=plain,
-        rel_rmse_corrected=corrected,
-        within_noise=corrected is not None and noise is not None and noise > 0 and corrected <= noise,
+        rel_rmse=rel_rmse(image, r),
+        rel_rmse_corrected=rel_rmse(image, r, error),
+        rel_rmse_limit=limit[0] if limit else None,
+        within_noise=limit[1] if limit else False,
         relmse=relmse(image, r),
         psnr=psnr(image, r),
         ssim=optional(ssim),
@@ -159,6 +164,23 @@ def rel_rmse(image: Light, reference: Light, error: Light | None = None) -> floa
     x, r = _pair(image, reference)
     mean = float(r.mean())
     return _without_noise(x - r, error) / mean if mean > 0 else None
+
+
+def hidden(image: Light, reference: Light, error: Light) -> tuple[float, bool] | None:
+    """The largest relative RMSE that a picture may have, and whether it may have none: both by three standard errors.
+
+    Each pixel gives one estimate of the mean square error, ``mean((x − r)² − se²)`` over its channels. Their scatter
+    gives the standard error of their mean, whatever the noise's distribution, as the noise of pixels is independent.
+    None where the reference is black, or has no noise after all.
+    """
+    x, r = _pair(image, reference)
+    mean, noise = float(r.mean()), np.square(error, dtype=np.float64)
+    if mean <= 0 or not noise.any():
+        return None
+    squares = np.mean((x - r) ** 2 - noise, axis=-1)
+    left = float(squares.mean())
+    uncertain = 3 * float(squares.std()) / math.sqrt(squares.size)
+    return math.sqrt(max(0.0, left) + uncertain) / mean, left < uncertain
 
 
 def relative_noise(reference: Light, error: Light | None) -> float | None:
@@ -318,27 +340,35 @@ def shadow_edges(lit: Light, unshadowed: Light, error: Light | None = None) -> N
     """Pixels near a visibility edge of a picture, (H, W).
 
     The light ratio is the picture's luminance over that of the same view in which nothing casts a shadow: 1 where every
-    light reaches, whatever the surface's colour and the medium; 0 in full shadow. A pixel is near an edge where this
-    ratio, as a mean of 3×3 pixels, varies by 0.2 or more among the pixels within :func:`edge_reach` of it, and by six
-    times its standard error, so that noise makes no edges. A penumbra counts where it is about as narrow as that;
-    a silhouette between a lit and a shaded surface counts too.
+    light reaches, whatever the surface's colour and the medium; 0 in full shadow; in the air, how much of what the eye
+    looks through is lit. A pixel is near an edge where this ratio, as a mean of 3×3 pixels, varies by a fifth of its
+    :func:`peak` or more among the pixels within :func:`edge_reach` of it, and by six times its standard error, so that
+    noise makes no edges. A penumbra counts where it is about as narrow as that; a silhouette between a lit and a shaded
+    surface counts too.
 
     Args:
-        lit: the picture, (H, W, 3) linear.
-        unshadowed: the same without shadows.
+        lit: the picture, (H, W, 3) linear, without what is ambient or shines by itself.
+        unshadowed: the same without shadows. Where its light is below a thousandth of its mean, as on a surface that
+            faces away from it, there is neither light nor shadow.
         error: standard error of ``lit``.
     """
     picture, full = (np.asarray(p, np.float64) @ LUMINANCE for p in (lit, unshadowed))
-    usable = full > 1e-6 * max(float(full.mean()), 1e-300)
-    ratio = np.divide(picture, full, out=np.ones_like(full), where=usable)
-    reach = edge_reach(ratio.shape[0])
-    smooth = _mean3(np.minimum(ratio, 2))  # scattered many times, light may exceed the unshadowed
-    least = np.full_like(smooth, EDGE_CONTRAST)
+    seen = full > 1e-3 * max(float(full.mean()), 1e-300)
+    ratio = np.divide(picture, full, out=np.zeros_like(full), where=seen)
+    white = min(peak(ratio[seen]), 2.0) if seen.any() else 0.0  # scattered many times, light may exceed the unshadowed
+    if white <= 0:
+        return np.zeros(full.shape, bool)
+    reach, count = edge_reach(ratio.shape[0]), _sum3(seen.astype(np.float64))
+    smooth = np.divide(_sum3(np.clip(ratio, 0, white)), count, out=np.zeros_like(full), where=seen)
+    greatest = _extreme(np.where(seen, smooth, -np.inf), reach, np.max)
+    least = _extreme(np.where(seen, smooth, np.inf), reach, np.min)
+    enough = np.full_like(full, EDGE_CONTRAST * white)
     if error is not None:
         noise = np.asarray(error, np.float64) @ LUMINANCE  # of channels that err alike, which is the worst
-        noise = np.divide(noise, full, out=np.zeros_like(full), where=usable)
-        least = np.maximum(least, 6 * _extreme(np.sqrt(_mean3(noise**2) / 9), reach, np.max))
-    return np.asarray(_extreme(smooth, reach, np.max) - _extreme(smooth, reach, np.min) >= least)
+        noise = np.divide(noise, full, out=np.zeros_like(full), where=seen)
+        noise = np.divide(np.sqrt(_sum3(noise**2)), count, out=np.zeros_like(full), where=seen)
+        enough = np.maximum(enough, 6 * _extreme(noise, reach, np.max))
+    return np.asarray(greatest - least >= enough)
 
 
 def edge_reach(height: int) -> int:
@@ -346,10 +376,11 @@ def edge_reach(height: int) -> int:
     return max(1, round(height / 180))
 
 
-def _mean3(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    padded = np.pad(values, 1, mode="edge")
+def _sum3(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The sum of each pixel and its eight neighbours; 0 beyond the picture."""
+    padded = np.pad(values, 1)
     rows = padded[:-2] + padded[1:-1] + padded[2:]
-    return np.asarray((rows[:, :-2] + rows[:, 1:-1] + rows[:, 2:]) / 9)
+    return np.asarray(rows[:, :-2] + rows[:, 1:-1] + rows[:, 2:])
 
 
 def _extreme(values: NDArray[np.float64], reach: int, which: Any) -> NDArray[np.float64]:

@@ -134,16 +134,44 @@ def test_the_corrected_error_is_unbiased_for_the_reference_s_noise(light: np.nda
     assert corrected == pytest.approx(math.sqrt(max(0, squares[-1])) / reference.mean())
 
 
-def test_an_error_below_the_noise_is_said_to_be_so(light: np.ndarray) -> None:
+def test_an_error_that_the_noise_hides_is_said_to_be_so(light: np.ndarray) -> None:
     error = np.full(light.shape, 0.2)
     target = metrics.Target(noisy(light, error, 3), error)
     same, far = metrics.score(light, target), metrics.score(1.5 * light, target)
     assert same.within_noise
+    assert same.rel_rmse_corrected < same.rel_rmse_limit < same.rel_rmse
+    assert far.rel_rmse_corrected < far.rel_rmse_limit < 1.2 * far.rel_rmse
     assert same.rel_rmse == pytest.approx(0.2 / light.mean(), rel=0.05)
     assert same.rel_rmse_corrected < 0.3 * same.rel_rmse
     assert not far.within_noise
     assert far.rel_rmse_corrected == pytest.approx(metrics.rel_rmse(1.5 * light, light), rel=0.02)
-    assert not metrics.score(light, metrics.Target(light)).within_noise, "without noise nothing is within it"
+    clear = metrics.score(light, metrics.Target(light))
+    assert not clear.within_noise, "without noise nothing is within it"
+    assert clear.rel_rmse_limit is None
+
+
+def test_a_small_error_shows_through_large_noise_in_a_large_picture() -> None:
+    """An error of 5 % under noise of 20 %: hidden among 100 pixels, plain among 100,000."""
+    found = []
+    for side in (10, 320):
+        light = np.ones((side, side, 3))
+        error = np.full(light.shape, 0.2)
+        reference = light + 0.2 * np.random.default_rng(side).standard_normal((side, side, 1))
+        found.append(metrics.hidden(1.05 * light, reference, error))
+    assert [hidden for _, hidden in found] == [True, False]
+    assert found[0][0] > found[1][0] > 0.05
+
+
+def test_right_pictures_are_seldom_called_wrong() -> None:
+    light = np.ones((24, 32, 3))
+    error = np.full(light.shape, 0.3)
+    wrong = 0
+    for seed in range(300):
+        reference = light + 0.3 * np.random.default_rng(seed).standard_normal((24, 32, 1))
+        limit, hidden = metrics.hidden(light, reference, error)
+        wrong += not hidden
+        assert limit < 0.3
+    assert wrong <= 4, "three standard errors"
 
 
 def test_the_reference_s_own_error_is_relative_to_its_mean() -> None:
@@ -284,6 +312,7 @@ def test_figures_without_light_are_none(light: np.ndarray) -> None:
     scores = metrics.score(light, metrics.Target(np.zeros_like(light)))
     figures = scores.to_json()
     assert figures.pop("rmse") > 0
+    assert figures["rel_rmse_limit"] is None
     assert figures.pop("best_scale") == 0
     assert figures.pop("within_noise") is False
     assert set(figures.values()) == {None}

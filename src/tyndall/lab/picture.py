@@ -15,6 +15,7 @@ import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,14 +68,34 @@ class Picture:
         path.write_bytes(encode_png(self.pixels, self.metadata))
 
     def _write_exr(self, path: Path) -> None:
-        import OpenEXR
-
         half = np.clip(self.radiance, -HALF_MAX, HALF_MAX).astype(np.float16)
-        channels = {name: np.ascontiguousarray(half[..., i]) for i, name in enumerate("RGB")}
-        header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
-        header |= {f"tyndall.{key}": value for key, value in self.metadata.items()}
-        depth = np.ascontiguousarray(self.depth, np.float32)
-        OpenEXR.File(header, {**channels, "Z": depth}).write(str(path))
+        write_layers(path, {"": half}, self.depth, self.metadata)
+
+
+def write_layers(
+    path: Path,
+    layers: Mapping[str, NDArray[np.floating[Any]]],
+    depth: NDArray[np.float32],
+    metadata: Mapping[str, str] | None = None,
+) -> None:
+    """Write an EXR with several pictures of one view.
+
+    Args:
+        layers: (H, W, 3) of half or single precision each, as they are written: channels ``R``, ``G``, ``B`` for the
+            name "", and ``name.R`` … for another.
+        depth: (H, W), channel ``Z``.
+        metadata: becomes the file's attributes.
+    """
+    import OpenEXR
+
+    channels = {
+        f"{layer}.{name}" if layer else name: np.ascontiguousarray(light[..., i])
+        for layer, light in layers.items()
+        for i, name in enumerate("RGB")
+    }
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    header |= {f"tyndall.{key}": value for key, value in (metadata or {}).items()}
+    OpenEXR.File(header, {**channels, "Z": np.ascontiguousarray(depth, np.float32)}).write(str(path))
 
 
 def encode_png(pixels: NDArray[np.uint8], metadata: Mapping[str, str] | None = None) -> bytes:
@@ -89,6 +110,17 @@ def encode_png(pixels: NDArray[np.uint8], metadata: Mapping[str, str] | None = N
     buffer = io.BytesIO()
     Image.fromarray(pixels, "RGB").save(buffer, "png", pnginfo=info)
     return buffer.getvalue()
+
+
+def check_folder(folder: Path) -> None:
+    """Raises OutputError where a folder of results cannot be made: before any work is done."""
+    for path in (folder, *folder.parents):
+        if path.is_dir():
+            if not os.access(path, os.W_OK):
+                raise OutputError(f"{folder}: {path} is not writable")
+            return
+        if path.exists():
+            raise OutputError(f"{folder}: {path} is a file, not a folder")
 
 
 def write_atomically(path: Path, write: Callable[[Path], None]) -> None:

@@ -25,7 +25,7 @@ from tyndall.techniques import FAMILIES
 from tyndall.techniques.antialiasing import NoAntialiasing
 from tyndall.techniques.contract import Technique
 from tyndall.techniques.shadow import ShadowMap
-from tyndall.techniques.volumetric import March
+from tyndall.techniques.volumetric import March, Off
 
 Overrides = Mapping[str, Mapping[str, Any]]
 
@@ -174,13 +174,13 @@ class Stage(Closing):
             renderer.draw()
         return self._still(technique.name)
 
+    def shafts(self) -> Still:
+        """The same view with sharp shadows in the air, without noise: a march through a fine shadow map."""
+        return self._marched(March(steps=128, jitter=0), ShadowMap(size=2048), casters=True)
+
     def unshadowed(self) -> Still:
-        """The same view where nothing casts a shadow, its air marched through by few steps."""
-        self.use(March(steps=32, jitter=0), still=True)
-        self._renderer.use("shadow", ShadowMap(size=16))
-        self._renderer.restart()
-        self._renderer.draw(casters=False)
-        return self._still("unshadowed")
+        """The same view where nothing casts a shadow."""
+        return self._marched(March(steps=32, jitter=0), ShadowMap(size=16), casters=False)
 
     def develop(self, radiance: NDArray[np.float32]) -> NDArray[np.uint8]:
         """(H, W, 3) linear light, as the stage's tone mapping shows it: (H, W, 3) uint8."""
@@ -190,6 +190,23 @@ class Stage(Closing):
         """Another stage that differs in its size only, on the same device."""
         same: dict[str, Any] = dict(self.techniques)
         return Stage(self.scene, size, adapter=self.gpu, seed=self.seed, **same)
+
+    def unlit(self) -> Still:
+        """The same view with all lights off: what shines by itself, and ambient light."""
+        renderer = self.use(Off(), still=True)
+        renderer.dim(0.0)
+        try:
+            renderer.draw()
+            return self._still("unlit")
+        finally:
+            renderer.dim(1.0)
+
+    def _marched(self, march: March, shadow: ShadowMap, *, casters: bool) -> Still:
+        renderer = self.use(march, still=True)
+        renderer.use("shadow", shadow)
+        renderer.restart()
+        renderer.draw(casters=casters)
+        return self._still(march.name)
 
     def _still(self, technique: str) -> Still:
         renderer = self._renderer
