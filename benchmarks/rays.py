@@ -13,6 +13,7 @@ from __future__ import annotations
 import argparse
 import json
 import time
+from collections import Counter
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,7 @@ from tyndall.frame import view_matrix
 from tyndall.gpu.device import Gpu
 from tyndall.lab.stage import adapter_name, driver_name
 from tyndall.scene.model import Camera, DirectionalLight, Instance, Mesh, Scene
-from tyndall.tracing import cast
+from tyndall.tracing import bvh, cast
 from tyndall.tracing.world import World
 
 
@@ -78,6 +79,25 @@ def rate(gpu: Gpu, world: World, rays: Any, entry: str, repeat: int) -> dict[str
     return {"rays": len(rays), "ms": round(best, 4), "per_second": round(len(rays) / best * 1e3), "hit": round(hit, 4)}
 
 
+def passes(gpu: Gpu, world: World) -> dict[str, float]:
+    """GPU milliseconds of the parts of a build."""
+    sums: Counter[str] = Counter()
+    submit = gpu.submit
+
+    def submit_and_count() -> None:
+        recorded = gpu.recording
+        submit()
+        if recorded:
+            sums.update(dict(gpu.timings()))
+
+    gpu.submit = submit_and_count  # type: ignore[method-assign]
+    try:
+        world.build()
+    finally:
+        del gpu.submit  # type: ignore[method-assign]
+    return {label: round(ms, 3) for label, ms in sums.items()}
+
+
 def measure(gpu: Gpu, name: str, scene: Scene, size: tuple[int, int], repeat: int) -> dict[str, Any]:
     begin = time.perf_counter()
     with World(gpu, scene) as world:
@@ -114,6 +134,7 @@ def measure(gpu: Gpu, name: str, scene: Scene, size: tuple[int, int], repeat: in
             "first_s": round(first, 4),
             "build_ms": round(1e3 * min(builds), 3),
             "build_all_ms": [round(1e3 * b, 2) for b in builds],
+            "build_passes_ms": passes(gpu, world),
             "primary": rate(gpu, world, pack(origins, ways, 1e9), "cast_closest", repeat),
             "shadow": rate(gpu, world, pack(points, towards, reach), "cast_occluded", repeat),
             "scattered": rate(gpu, world, pack(points, scattered, 1e9), "cast_closest", repeat),
@@ -125,9 +146,11 @@ def main() -> None:
     parser.add_argument("scenes", nargs="*", default=["box", "blinds", "courtyard"])
     parser.add_argument("--size", default="1920x1080")
     parser.add_argument("--repeat", type=int, default=8)
+    parser.add_argument("--radius", type=int, default=bvh.RADIUS, help="of the search for neighbours, 1 to 64")
     parser.add_argument("--flat", action="store_true", help="each scene as one mesh, too")
     chosen = parser.parse_args()
     width, height = (int(side) for side in chosen.size.split("x"))
+    bvh.RADIUS = chosen.radius
     rows = []
     with Gpu() as gpu:
         for name in chosen.scenes:

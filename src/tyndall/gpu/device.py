@@ -534,6 +534,11 @@ class Gpu(Closing):
         self.device.queue.submit([self._encoder.finish()])
         self._submitted_labels, self._labels, self._encoder = self._labels, [], None
 
+    @property
+    def recording(self) -> bool:
+        """Whether passes wait to be submitted."""
+        return self._encoder is not None
+
     def discard(self) -> None:
         """Forget the passes recorded since the last submit."""
         self._encoder, self._chain, self._labels = None, None, []
