@@ -46,7 +46,8 @@ if TYPE_CHECKING:
     )
     from tyndall.scene.stage import stage
     from tyndall.techniques.antialiasing import NoAntialiasing, Taa
-    from tyndall.techniques.shadow import ShadowMap
+    from tyndall.techniques.occlusion import NoOcclusion, RayTracedAo
+    from tyndall.techniques.shadow import RayTraced, ShadowMap
     from tyndall.techniques.tonemap import Aces, Agx, Clip
     from tyndall.techniques.volumetric import Froxel, March, Off, Polygonal, ScreenSpace
 
@@ -71,11 +72,14 @@ __all__ = [
     "Medium",
     "Mesh",
     "NoAntialiasing",
+    "NoOcclusion",
     "Off",
     "ParameterError",
     "Picture",
     "PointLight",
     "Polygonal",
+    "RayTraced",
+    "RayTracedAo",
     "Rayleigh",
     "Renderer",
     "Scene",
@@ -108,6 +112,7 @@ _HOMES = (
     "tyndall.gpu.device",
     "tyndall.techniques.volumetric",
     "tyndall.techniques.shadow",
+    "tyndall.techniques.occlusion",
     "tyndall.techniques.antialiasing",
     "tyndall.techniques.tonemap",
     "tyndall.frame",

@@ -16,6 +16,7 @@ def render(
     size: tuple[int, int] = (1280, 720),
     volumetric: str | Technique = "froxel",
     shadow: str | Technique | None = None,
+    occlusion: str | Technique | None = None,
     antialiasing: str | Technique | None = None,
     tonemap: str | Technique | None = None,
     parameters: Overrides | None = None,
@@ -27,8 +28,8 @@ def render(
 
     Args:
         size: width and height in pixels.
-        volumetric, shadow, antialiasing, tonemap: a technique of each family, by name or ready made; None is the
-            family's default. One made by name starts from the scene's looks.
+        volumetric, shadow, occlusion, antialiasing, tonemap: a technique of each family, by name or ready made; None
+            is the family's default. One made by name starts from the scene's looks.
         parameters: by technique name, parameters to change: ``{"froxel": {"grid": (190, 90, 128)}}``.
         frames: how many frames are drawn; temporal antialiasing gathers its samples from them.
         adapter: part of an adapter's name, or a device to share.
@@ -40,7 +41,7 @@ def render(
     """
     if frames < 1:
         raise ParameterError(f"frames: {frames} is fewer than 1")
-    others = {"shadow": shadow, "antialiasing": antialiasing, "tonemap": tonemap}
+    others = {"shadow": shadow, "occlusion": occlusion, "antialiasing": antialiasing, "tonemap": tonemap}
     with Stage(scene, size, parameters=parameters, adapter=adapter, seed=seed, **others) as stage:
         technique = make("volumetric", volumetric, scene, parameters)
         renderer = stage.use(technique)
