@@ -52,6 +52,15 @@ class Scale:
         position = np.log(np.maximum(error, 1e-30) / self.low) / math.log(self.high / self.low)
         return np.clip(np.rint(255 * position), 0, 255).astype(np.uint8)
 
+    def ticks(self) -> list[tuple[float, float]]:
+        """Values to write beside the colours, each with its place 0 … 1: the powers of ten, and the upper end."""
+        span = math.log10(self.high / self.low)
+        first, last = math.ceil(math.log10(self.low) - 1e-9), math.floor(math.log10(self.high) + 1e-9)
+        values = [10.0**power for power in range(first, last + 1)]
+        if math.log10(self.high / values[-1]) > 0.12 * span:
+            values.append(self.high)
+        return [(value, math.log10(value / self.low) / span) for value in values]
+
 
 @cache
 def colour_map() -> NDArray[np.uint8]:

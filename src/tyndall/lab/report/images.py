@@ -127,7 +127,7 @@ def _pictures(study: Study) -> tuple[dict[str, NDArray[np.uint8]], dict[str, NDA
 
 
 def _error_maps(study: Study) -> dict[str, dict[str, NDArray[np.float32]]]:
-    """(H, W) by kind of light and technique (:func:`tyndall.lab.metrics.error_map`).
+    """(H, W) by kind of light and technique (:func:`tyndall.lab.metrics.error_map`); "truth" is its standard error.
 
     The frames that errors were measured on are used where they were saved; else the antialiased ones.
     """
@@ -152,6 +152,9 @@ def _error_maps(study: Study) -> dict[str, dict[str, NDArray[np.float32]]]:
             if image is not None:
                 _check_size(study, source, image)
                 found.setdefault(kind, {})[label] = metrics.error_map(image, target)
+        noise = codec.layer(reference, f"{_LAYERS[kind] or 'radiance'}_error", path)
+        if noise is not None and noise.any() and kind in found:
+            found[kind][TRUTH] = metrics.error_map(target + noise, target)
     return found
 
 
@@ -163,7 +166,7 @@ def _check_size(study: Study, path: Path, pixels: NDArray[np.generic]) -> None:
 
 def _encode_maps(errors: Mapping[str, NDArray[np.float32]], factor: int) -> Maps:
     smaller = {label: codec.shrink(m, factor, power=2) for label, m in errors.items()}
-    scale = Scale.over(smaller.values())
+    scale = Scale.over(m for label, m in smaller.items() if label != TRUTH)
     return Maps(scale, {label: _uri(encode_map(m, scale), "png") for label, m in smaller.items()})
 
 
@@ -177,7 +180,7 @@ def _places(
     field = np.zeros((height, width))
     for label, error in first.items():
         square = codec.shrink(error, factor, power=2).astype(np.float64) ** 2
-        if label not in baseline and square.any():
+        if label not in baseline and label != TRUTH and square.any():
             field += square / square.mean()
     places = worst_places(np.sqrt(field).astype(np.float32), 3)
     patch = (min(width, max(16, width // 8)), min(height, max(12, 3 * width // 32)))

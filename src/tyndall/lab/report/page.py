@@ -14,9 +14,11 @@ from tyndall.lab.report.heat import colour_map
 from tyndall.lab.report.images import TRUTH, Images
 from tyndall.lab.report.markup import Html, data, join, tag
 from tyndall.lab.report.results import Milliseconds, Result, Study
+from tyndall.lab.report.table import COLOURS, figure, scroll, table
 
+_LONG = 44  # characters; a longer fact has two columns
+_SHORT = {"inscattered": "air", "surfaces": "surfaces", "radiance": "whole"}
 _SCRIPTS = ("base.js", "light.js", "viewer.js", "maps.js", "crops.js", "plots.js", "main.js")
-_PALETTE = 8  # colours that report.css knows
 
 
 def page(title: str, parts: Sequence[tuple[str, Html]], overview: Html | None = None) -> str:
@@ -42,7 +44,7 @@ def page(title: str, parts: Sequence[tuple[str, Html]], overview: Html | None = 
         tag("footer", "One file, made by Tyndall: it holds its pictures and asks nothing of the network."),
         data({"palette": ["#" + bytes(c).hex() for c in colour_map()],
               "metrics": {m.key: {"name": m.name, "unit": m.unit, "better": m.better} for m in verdict.METRICS},
-              "kinds": verdict.KINDS, "colours": _PALETTE}, id="shared"),
+              "kinds": verdict.KINDS, "colours": COLOURS}, id="shared"),
     )  # fmt: skip
     script = "\n".join(_asset(name) for name in _SCRIPTS)
     style = _asset("report.css")
@@ -62,7 +64,7 @@ def comparison(study: Study, images: Images, number: int, heading: str = "h1") -
         _errors(study, images, prefix),
         _crops(study, images, prefix),
         _cost(study, prefix),
-        _table(study, prefix),
+        table(study, prefix),
         _setup(study, prefix),
         data(_plain(study, images), class_="data"),
         *(
@@ -81,16 +83,16 @@ def overview(studies: Sequence[Study]) -> Html:
     rows = []
     for number, study in enumerate(studies):
         judged = verdict.main_metric(study)
-        best = dict.fromkeys(_front(study))
+        best = verdict.best(study)
         cells = []
         for label in labels:
             result = next((r for r in study.results if r.label == label), None)
             if result is None:
                 cells.append(tag("td", "–"))
                 continue
-            error = result.errors.get(judged[0], {}).get(judged[1]) if judged else None
+            error = verdict.judged_error(result, *judged) if judged else None
             cells.append(
-                tag("td", tag("strong", verdict.percent(error)) if error is not None else "–", tag("br"),
+                tag("td", tag("strong", str(error)) if error else "–", tag("br"),
                     tag("small", verdict.milliseconds(result.gpu_ms.median) if result.gpu_ms else "not timed"),
                     class_="front" if label in best else None)
             )  # fmt: skip
@@ -107,7 +109,7 @@ def overview(studies: Sequence[Study]) -> Html:
             "Error and GPU time of each technique in each scene; marked: on the scene’s Pareto front of both.",
             class_="lead",
         ),
-        _scroll(tag("table", tag("thead", head), tag("tbody", *rows)), "All comparisons"),
+        scroll(tag("table", tag("thead", head), tag("tbody", *rows)), "All comparisons"),
         class_="overview",
     )
 
@@ -127,12 +129,11 @@ def _head(study: Study, heading: str) -> Html:
         ]
     else:
         facts.append(("Truth", "none was asked for"))
-    said = verdict.doubt(study)
     return tag(
         "header",
         tag(heading, study.scene),
         tag("p", verdict.verdict(study), class_="lead"),
-        tag("p", said, class_="doubt") if said else None,
+        tag("p", " ".join(verdict.remarks(study)), class_="remarks"),
         _list(facts, "facts"),
         class_="opening",
     )
@@ -154,7 +155,7 @@ def _pictures(study: Study, images: Images, prefix: str) -> Html:
         ]  # fmt: skip
         return tag("fieldset", tag("legend", name, class_="quiet"), *buttons, class_="choice")
 
-    shows = [("picture", "picture")] + [(kind, f"error: {verdict.kind_name(kind)}") for kind in images.maps]
+    shows = [("picture", "picture")] + [(kind, f"error: {_SHORT.get(kind, kind)}") for kind in images.maps]
     light = None
     if images.light:
         curves = [("aces", "ACES"), ("agx", "AgX"), ("none", "sRGB, clipped")]
@@ -256,9 +257,11 @@ def _errors(study: Study, images: Images, prefix: str) -> Html:
         cells = [
             tag("figure",
                 tag("img", src=uri, width=images.size[0], height=images.size[1], tabindex=0,
-                    alt=f"Error map of {label}: {verdict.kind_name(kind)}, from {low} (black) to {high} (cream)",
+                    alt=f"Map of {'the standard error of the truth' if label == TRUTH else f'the error of {label}'}: "
+                    f"{verdict.kind_name(kind)}, from {low} (black) to {high} (cream)",
                     id=f"{prefix}-map-{number}-{i}", data_map=label),
-                tag("figcaption", tag("span", label), tag("output", data_role="value")))
+                tag("figcaption", tag("span", "the truth’s own standard error" if label == TRUTH else label),
+                    tag("output", data_role="value")))
             for i, (label, uri) in enumerate(maps.uris.items())
         ]  # fmt: skip
         ramp = tag("div", class_="ramp", data_role="ramp", role="img",
@@ -266,25 +269,15 @@ def _errors(study: Study, images: Images, prefix: str) -> Html:
         figures.append(
             tag("figure",
                 tag("div", tag("p", f"{what}, % of the truth’s mean", class_="axis"), ramp,
-                    tag("div", *(tag("span", text, style=f"left:{100 * at:.2f}%") for at, text in _decades(maps.scale)),
+                    tag("div", *(tag("span", verdict.percent(v, 1), style=f"left:{100 * at:.2f}%")
+                                for v, at in maps.scale.ticks()),
                         class_="ticks"), class_="bar-of-colours"),
-                tag("div", *cells, class_="grid"),
-                tag("figcaption", f"{what}, pixel by pixel, against the truth; one scale for all techniques."),
-                class_="maps", data_kind=kind, hidden=None)
+                tag("div", *cells, class_="grid", style=f"--columns:{len(cells) if len(cells) < 5 else 3}"),
+                tag("figcaption", f"{what}, pixel by pixel, against the truth, whose own noise is in it; one scale for "
+                    "all. Point at a pixel, or move by the arrow keys, to read it in every map."),
+                class_="maps", data_kind=kind)
         )  # fmt: skip
     return tag("section", tag("h2", "Where the error is"), *figures, id=f"{prefix}-errors")
-
-
-def _decades(scale: Any) -> list[tuple[float, str]]:
-    """Places 0 … 1 on a logarithmic scale, and their labels: every power of ten, and both ends."""
-    import math
-
-    span = math.log10(scale.high / scale.low)
-    powers = range(math.ceil(math.log10(scale.low) - 1e-9), math.floor(math.log10(scale.high) + 1e-9) + 1)
-    values = [10.0**p for p in powers]
-    if values[-1] < scale.high * 0.999 and math.log10(scale.high / values[-1]) > 0.12 * span:
-        values.append(scale.high)
-    return [(math.log10(v / scale.low) / span, f"{100 * v:g} %") for v in values]
 
 
 def _crops(study: Study, images: Images, prefix: str) -> Html:
@@ -300,7 +293,8 @@ def _crops(study: Study, images: Images, prefix: str) -> Html:
         head = tag("h3", f"Place {number} ", tag("small", where))
         rows.append(tag("div", head, tag("div", *cells, class_="crops"), class_="place", data_place=number - 1))
     chosen = "Where the techniques differ most from the truth" if study.reference else "The middle of the picture"
-    text = f"{chosen}, magnified without smoothing. Click the large picture for a place of your own."
+    text = f"{chosen}, magnified without smoothing; exposure and “Show” above hold here too. "
+    text += "Click the large picture for a place of your own."
     return tag(
         "section", tag("h2", "Close up"), tag("p", text, class_="note"), *rows, id=f"{prefix}-crops", class_="closeup"
     )
@@ -327,10 +321,10 @@ def _cost(study: Study, prefix: str) -> Html:
         tag("div", data_role="scatter", class_="plot script"),
         tag(
             "figcaption",
-            "Cost against error, both logarithmic where that is the better scale; down and left is better. The line is "
-            "the Pareto front: no other technique is both cheaper and more accurate than one on it. Whiskers reach "
-            "from the least disturbed frame to the 95th percentile; hatched is the truth’s own standard error, inside "
-            "which nothing can be told apart. The dashed line is the error of drawing no light at all.",
+            "Down and left is better. The line is the Pareto front: no technique is both cheaper and more accurate "
+            "than one on it. Whiskers reach from the least disturbed frame to the 95th percentile; an arrow down marks "
+            "an error that the truth’s noise hides, drawn at what it may be at most; hatched is that noise, where it "
+            "is in the error. The dashed line is drawing no light at all. A point opens its picture against the truth.",
             class_="script",
         ),
         tag("details", tag("summary", "The plot’s data as a table"), _scatter_table(study)),
@@ -351,7 +345,7 @@ def _cost(study: Study, prefix: str) -> Html:
                 tag("div", data_role=role, class_="plot script"),
                 tag("figcaption", caption),
                 tag("details", tag("summary", "The plot’s data as a table"),
-                    _scroll(tag("table", tag("thead", tag("tr", tag("th", "technique", scope="col"),
+                    scroll(tag("table", tag("thead", tag("tr", tag("th", "technique", scope="col"),
                         tag("th", "pass" if role == "passes" else "owner", scope="col"),
                         tag("th", unit, scope="col"))), tag("tbody", *rows)), title)))
         )  # fmt: skip
@@ -368,20 +362,20 @@ def _cost(study: Study, prefix: str) -> Html:
 def _scatter_table(study: Study) -> Html:
     judged = verdict.main_metric(study)
     rows = []
-    best = _front(study)
+    best = verdict.best(study)
     for result in study.results:
-        error = _score(result, *judged) if judged else None
+        error = verdict.judged_error(result, *judged) if judged else None
         rows.append(
-            tag("tr", tag("th", result.label, scope="row"), _number(result.gpu_ms.median if result.gpu_ms else None, 1),
-                _number(error, 100), tag("td", "yes" if result.label in best else "no"))
+            tag("tr", tag("th", result.label, scope="row"), figure(result.gpu_ms.median if result.gpu_ms else None, 1),
+                tag("td", str(error) if error else "–"), tag("td", "yes" if result.label in best else "no"))
         )  # fmt: skip
-    head = tag("tr", *(tag("th", text, scope="col") for text in ("technique", "GPU ms", "error %", "on the front")))
-    return _scroll(tag("table", tag("thead", head), tag("tbody", *rows)), "Cost against error")
+    head = tag("tr", *(tag("th", text, scope="col") for text in ("technique", "GPU ms", "error", "on the front")))
+    return scroll(tag("table", tag("thead", head), tag("tbody", *rows)), "Cost against error")
 
 
 def _passes(study: Study) -> list[Html]:
     return [
-        tag("tr", tag("th", result.label, scope="row"), tag("td", name, class_="text"), _number(times.median, 1))
+        tag("tr", tag("th", result.label, scope="row"), tag("td", name, class_="text"), figure(times.median, 1))
         for result in study.results
         for name, times in result.passes.items()
     ]
@@ -389,81 +383,10 @@ def _passes(study: Study) -> list[Html]:
 
 def _memory(study: Study) -> list[Html]:
     return [
-        tag("tr", tag("th", r.label, scope="row"), tag("td", owner, class_="text"), _number(size, 2**-20))
+        tag("tr", tag("th", r.label, scope="row"), tag("td", owner, class_="text"), figure(size, 2**-20))
         for r in study.results
         for owner, size in (r.memory or {study.family: r.memory_bytes or 0.0}).items()
     ]
-
-
-def _table(study: Study, prefix: str) -> Html:
-    """Every figure; a column is sorted by the button in its head."""
-    kinds = study.kinds
-    columns: list[tuple[str, str, float, str | None, list[float | None]]] = []  # group, name, factor, better, values
-
-    def times(name: str, pick: Any) -> None:
-        for part in ("median", "min", "p95"):
-            values = [getattr(t, part) if (t := pick(r)) else None for r in study.results]
-            if any(v is not None for v in values):
-                columns.append((name, part, 1, "less" if part == "median" else None, values))
-
-    times(f"{study.family} GPU ms", lambda r: r.gpu_ms)
-    times("frame GPU ms", lambda r: r.frame_ms)
-    times("host ms", lambda r: r.host_ms)
-    memory = [r.memory_bytes for r in study.results]
-    if any(m is not None for m in memory):
-        columns.append(("memory", "MiB", 2**-20, "less", memory))
-    for kind in kinds:
-        for metric in verdict.METRICS:
-            values = [_score(r, kind, metric.key) for r in study.results]
-            if any(v is not None for v in values):
-                unit = f" {metric.unit}" if metric.unit in ("%", "dB") else ""
-                factor = 100 if metric.unit == "%" else 1
-                columns.append((f"error: {verdict.kind_name(kind)}", metric.name + unit, factor, metric.better, values))
-    groups: list[tuple[str, int]] = []
-    for group, *_ in columns:
-        if groups and groups[-1][0] == group:
-            groups[-1] = (group, groups[-1][1] + 1)
-        else:
-            groups.append((group, 1))
-    top = tag("tr", tag("td"), *(tag("th", name, colspan=n, scope="colgroup") for name, n in groups))
-    heads = [tag("th", tag("button", "technique", type="button"), scope="col", aria_sort="none")]
-    heads += [
-        tag(
-            "th", tag("button", name, type="button", aria_label=f"{group}, {name}: sort"), scope="col", aria_sort="none"
-        )
-        for group, name, *_ in columns
-    ]
-    candidates = [i for i, r in enumerate(study.results) if r.technique != verdict.BASELINE]
-    bests = [_best(better, values, candidates) for *_, better, values in columns]
-    rows = []
-    for i, result in enumerate(study.results):
-        cells = [
-            _number(values[i], factor, best=i in best)
-            for (_, _, factor, _, values), best in zip(columns, bests, strict=True)
-        ]
-        rows.append(tag("tr", tag("th", _swatch(i), result.label, scope="row"), *cells, data_result=i))
-    table = tag("table", tag("thead", top, tag("tr", *heads)), tag("tbody", *rows), class_="sortable")
-    return tag(
-        "section",
-        tag("h2", "All figures"),
-        tag("p", "Bold is the best of a column. A column’s head sorts by it.", class_="note"),
-        _scroll(table, "All figures"),
-        id=f"{prefix}-table",
-    )
-
-
-def _best(better: str | None, values: Sequence[float | None], among: Sequence[int]) -> set[int]:
-    """The rows with the best value of a column, if there is a choice."""
-    known = {i: _distance(better, v) for i in among if better and (v := values[i]) is not None}
-    least = min(known.values(), default=None)
-    return {i for i, value in known.items() if value == least} if len(known) > 1 else set()
-
-
-def _distance(better: str, value: float) -> float:
-    """How far a metric's value is from where a perfect picture lies, up to a constant."""
-    if better == "more":
-        return -value
-    return abs(value - 1) if better == "one" else abs(value)
 
 
 def _setup(study: Study, prefix: str) -> Html:
@@ -476,7 +399,8 @@ def _setup(study: Study, prefix: str) -> Html:
     facts.append(("Adapter", study.adapter))
     if study.driver:
         facts.append(("Driver", study.driver))
-    facts += [(f"Version of {name}" if name != "system" else "System", v) for name, v in study.versions.items()]
+    if study.versions:
+        facts.append(("Versions", ", ".join(f"{name} {version}" for name, version in study.versions.items())))
     truth = None
     if study.reference:
         known = study.reference
@@ -586,17 +510,6 @@ def _plain(study: Study, images: Images) -> dict[str, Any]:
     }
 
 
-def _front(study: Study) -> list[str]:
-    judged = verdict.main_metric(study)
-    if judged is None:
-        return []
-    return verdict.front(
-        (r.label, r.gpu_ms.median, error)
-        for r in study.results
-        if r.technique != verdict.BASELINE and r.gpu_ms and (error := _score(r, *judged)) is not None
-    )
-
-
 def _score(result: Result, kind: str, key: str) -> float | None:
     return result.errors.get(kind, {}).get(key)
 
@@ -616,21 +529,9 @@ def _figures(study: Study, key: str) -> str:
     if result is None:
         return study.reference.judge if study.reference else ""
     judged = verdict.main_metric(study)
-    error = _score(result, *judged) if judged else None
+    error = verdict.judged_error(result, *judged) if judged else None
     words = [verdict.milliseconds(result.gpu_ms.median)] if result.gpu_ms else []
-    return " · ".join(words + ([verdict.percent(error)] if error is not None else []))
-
-
-def _swatch(index: int) -> Html:
-    return tag("i", class_=f"swatch k{index % _PALETTE}", aria_hidden="true")
-
-
-def _number(value: float | None, factor: float, *, best: bool = False) -> Html:
-    """A cell; the exact value goes along for sorting."""
-    if value is None:
-        return tag("td", "–")
-    text = "0" if factor == 2**-20 and value < 512 else verdict.significant(value * factor, 3)
-    return tag("td", tag("strong", text) if best else text, data_value=repr(float(value)))
+    return " · ".join(words + ([str(error)] if error else []))
 
 
 def _value(value: Any) -> str:
@@ -638,18 +539,19 @@ def _value(value: Any) -> str:
         return value
     if isinstance(value, float):
         return f"{value:g}"
-    if isinstance(value, list) and not any(isinstance(v, dict | list) for v in value):
+    if isinstance(value, list):
         return ", ".join(_value(v) for v in value)
-    return json.dumps(value, ensure_ascii=False)
+    if isinstance(value, dict):
+        return ", ".join(f"{key} {_value(v)}" for key, v in value.items())
+    return json.dumps(value)
 
 
 def _list(pairs: Sequence[tuple[str, str | Html]], kind: str) -> Html:
-    return tag("dl", *(tag("div", tag("dt", name), tag("dd", value)) for name, value in pairs), class_=kind)
-
-
-def _scroll(table: Html, name: str) -> Html:
-    """A table that scrolls by itself where the screen is narrow, also by the keyboard."""
-    return tag("div", table, class_="scroll", tabindex=0, role="region", aria_label=name)
+    rows = (
+        tag("div", tag("dt", name), tag("dd", value), class_="long" if len(value) > _LONG else None)
+        for name, value in pairs
+    )
+    return tag("dl", *rows, class_=kind)
 
 
 def _asset(name: str) -> str:

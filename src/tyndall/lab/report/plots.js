@@ -26,7 +26,7 @@ function makeScale(values, log, from, to) {
     [low, high] = [low - pad, high + pad];
     const powers = [];
     for (let p = Math.floor(low); p <= Math.ceil(high); p++) powers.push(p);
-    const steps = high - low < 1.6 ? [1, 2, 5] : [1];
+    const steps = high - low < 2.3 ? [1, 2, 5] : [1];
     const ticks = powers.flatMap((p) => steps.map((s) => s * 10 ** p)).filter((t) => Math.log10(t) >= low && Math.log10(t) <= high);
     const minor = powers.flatMap((p) => [2, 3, 4, 5, 6, 7, 8, 9].map((s) => s * 10 ** p)).filter((t) => Math.log10(t) >= low && Math.log10(t) <= high);
     return { at: (v) => from + ((Math.log10(v) - low) / (high - low)) * (to - from), ticks, minor };
@@ -52,6 +52,14 @@ function paretoFront(points) {
   return front;
 }
 
+/** A technique's error; where the truth's noise hides it, what it may be at most. As `judged_error` in verdict.py. */
+function errorOf(result, kind, key) {
+  const scores = result.errors[kind] ?? {}, value = scores[key] ?? null;
+  if (value === null) return null;
+  if (key === "rel_rmse_corrected" && scores.within_noise && scores.rel_rmse_limit) return { value: scores.rel_rmse_limit, hidden: true };
+  return { value: key === "bias" ? Math.abs(value) : value, hidden: false };
+}
+
 function setUpScatter(article, study, state) {
   const holder = article.querySelector('[data-role="scatter"]');
   const picker = (role) => article.querySelector(`.cost [data-role="${role}"]`);
@@ -67,21 +75,21 @@ function setUpScatter(article, study, state) {
     const percentage = shared.metrics[key].unit === "%" ? 100 : 1;
     const sign = turned(key) ? -1 : 1;
     const scores = study.results.map((result, index) => {
-      const value = result.errors[kind]?.[key];
-      const error = value === null || value === undefined ? null : key === "bias" ? Math.abs(value) : value;
-      return { result, index, error, cost: cost.of(result) };
+      const error = errorOf(result, kind, key);
+      return { result, index, error: error?.value ?? null, hidden: error?.hidden ?? false, cost: cost.of(result) };
     }).filter((p) => p.error !== null);
+    const worded = (p) => (p.hidden ? "<\u00a0" : "") + scored(key, p.error);
     const log = logarithmic(key) || key === "bias";
     // What cannot stand on a logarithmic axis is told below the plot rather than drawn at a false place.
     const fits = (v, isLog) => Number.isFinite(v) && (!isLog || v > 0);
     const lines = scores.filter((p) => p.result.baseline && fits(p.error, log));
     const points = scores.filter((p) => !p.result.baseline && fits(p.error, log) && fits(p.cost, true));
     const absent = study.results.filter((r) => ![...lines, ...points].some((p) => p.result === r));
-    const noise = ["rel_rmse", "rel_rmse_corrected", "scaled_rel_rmse"].includes(key) ? study.noise[kind] : null;
+    const noise = key === "rel_rmse" ? study.noise[kind] : null; // the others have it taken off
 
     const height = clamp(width * 0.56, 300, 460), left = 62, right = 16, top = 16, bottom = 48;
     const svg = draw("svg", { viewBox: `0 0 ${width} ${height}`, height, role: "group" });
-    const told = points.map((p) => `${p.result.label} ${cost.text(p.cost)}, ${scored(key, p.error)}`).join("; ");
+    const told = points.map((p) => `${p.result.label} ${cost.text(p.cost)}, ${worded(p)}`).join("; ");
     svg.setAttribute("aria-label", `${shared.metrics[key].name} against ${cost.name}: ${told || "no points"}`);
     const spread = points.flatMap((p) => { const s = cost.spread(p.result); return [p.cost, s?.min, s?.p95].filter((v) => v > 0); });
     const x = makeScale(spread.length ? spread : [1, 10], true, left, width - right);
@@ -111,8 +119,9 @@ function setUpScatter(article, study, state) {
     svg.append(draw("text", { x: (left + width - right) / 2, y: height - 8, "text-anchor": "middle" }, cost.name),
       draw("text", { transform: `translate(15 ${(top + height - bottom) / 2}) rotate(-90)`, "text-anchor": "middle" }, metricName + unit));
 
-    const ranked = points.map((p) => ({ ...p, error: sign * p.error }));
-    const front = paretoFront(ranked).map((p) => [x.at(p.cost), y.at(sign * p.error * percentage)]);
+    // Errors that the truth's noise hides are equal: nothing tells them apart.
+    const ranked = points.map((p) => ({ ...p, shown: p.error, error: p.hidden ? 0 : sign * p.error }));
+    const front = paretoFront(ranked).map((p) => [x.at(p.cost), y.at(p.shown * percentage)]);
     if (front.length) {
       // A step: between two points nothing better is known than the one on the left.
       const path = front.map(([fx, fy], i) => (i ? `H${fx}V${fy}` : `M${fx},${top}V${fy}`)).join("") + `H${width - right}`;
@@ -130,18 +139,20 @@ function setUpScatter(article, study, state) {
         draw("text", { x: toRight ? width - right - 8 : left + 8, y: at - 6, "text-anchor": toRight ? "end" : "start", class: "soft label" }, text)));
       taken.push(toRight ? [width - right - 150, at - 18, width - right, at + 2] : [left, at - 18, left + 150, at + 2]);
     }
-    for (const { result, index, error, cost: value } of points) {
+    for (const point of points) {
+      const { result, index, error, cost: value, hidden } = point;
       const px = x.at(value), py = y.at(error * percentage), color = colourOf(index), onFront = front.some(([fx, fy]) => fx === px && fy === py);
-      const text = `${result.label}: ${cost.text(value)}, ${scored(key, error)}${onFront ? ", on the Pareto front" : ""}`;
+      const text = `${result.label}: ${cost.text(value)}, ${worded(point)}${onFront ? ", on the Pareto front" : ""}`;
       const choose = () => chooseTechnique(study, state, result.label, article);
       const mark = draw("g", { class: "point mark", "data-result": index, tabindex: 0, role: "button", "aria-label": `${text}; show it against the truth`,
         click: choose, keydown: (event) => { if (event.key === "Enter" || event.key === " ") { event.preventDefault(); choose(); } } },
         draw("title", {}, text), draw("circle", { class: "halo", cx: px, cy: py, r: 15 }));
       const ends = cost.spread(result);
       if (ends?.min > 0 && ends.p95 > 0) mark.append(draw("path", { class: "whisker", stroke: color, fill: "none", d: `M${x.at(ends.min)},${py}H${x.at(ends.p95)}M${x.at(ends.min)},${py - 4}v8M${x.at(ends.p95)},${py - 4}v8` }));
+      if (hidden) mark.append(draw("path", { class: "whisker", stroke: color, fill: "none", d: `M${px},${py}v26m-4,-6l4,6l4,-6` }));
       mark.append(draw("path", { d: shapeOf(index)(px, py, 6.5), fill: onFront ? color : "var(--paper)", stroke: color, "stroke-width": 2.2 }));
       svg.append(mark);
-      taken.push([px - 9, py - 9, px + 9, py + 9]);
+      taken.push([px - 9, py - 9, px + 9, py + (hidden ? 27 : 9)]);
       if (ends) taken.push([x.at(ends.min ?? value), py - 4, x.at(ends.p95 ?? value), py + 4]);
     }
     holder.replaceChildren(svg);

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from tyndall.lab.report.results import Study
+from tyndall.lab.report.results import Result, Study
 
 BASELINE = "off"  # draws nothing: its error is the light that there is, and it is no candidate
 
@@ -30,11 +30,12 @@ class Metric:
 METRICS = (
     Metric(
         "rel_rmse_corrected",
-        "rel. RMSE, truth’s noise off",
+        "rel. RMSE, corrected",
         "%",
         "less",
         "Root mean square error over the truth’s mean, after the truth’s own variance is taken off: an unbiased "
-        "estimate of the technique’s own error.",
+        "estimate of the technique’s own error. “<” is what it may be at most, by three standard errors, where the "
+        "truth’s noise hides it.",
     ),
     Metric(
         "rel_rmse",
@@ -140,75 +141,105 @@ def main_metric(study: Study) -> tuple[str, str] | None:
     return None
 
 
+@dataclass(frozen=True)
+class Judged:
+    """An error as it can be known: where the truth’s noise hides it (``hidden``), ``value`` is what it is at most."""
+
+    value: float
+    hidden: bool = False
+
+    @property
+    def rank(self) -> float:
+        """For comparing techniques: all hidden errors are equal, as nothing tells them apart."""
+        return 0.0 if self.hidden else self.value
+
+    def __str__(self) -> str:
+        return ("<\u00a0" if self.hidden else "") + percent(self.value)
+
+
+def judged_error(result: Result, kind: str, key: str) -> Judged | None:
+    """A relative error of a technique; None where it was not measured."""
+    scores = result.errors.get(kind, {})
+    value, limit = scores.get(key), scores.get("rel_rmse_limit")
+    if value is None:
+        return None
+    if key == "rel_rmse_corrected" and scores.get("within_noise") and limit is not None:
+        return Judged(limit, hidden=True)
+    return Judged(value)
+
+
+def best(study: Study) -> list[str]:
+    """The labels on the Pareto front of GPU time and error."""
+    judged = main_metric(study)
+    if judged is None:
+        return []
+    errors = {r.label: judged_error(r, *judged) for r in study.results if r.technique != BASELINE}
+    times = {r.label: r.gpu_ms.median for r in study.results if r.gpu_ms}
+    return front((label, times[label], e.rank) for label, e in errors.items() if e and label in times)
+
+
 def verdict(study: Study) -> str:
-    """A sentence or two: who is on the Pareto front of time and error, with the figures, and who is not."""
+    """One sentence: who is on the Pareto front of time and error, with the figures."""
     judged = main_metric(study)
     candidates = [r for r in study.results if r.technique != BASELINE]
-    timed = [(r.label, r.gpu_ms.median) for r in candidates if r.gpu_ms]
+    timed = {r.label: r.gpu_ms.median for r in candidates if r.gpu_ms}
     if judged is None:
         if not timed:
             return "Neither errors nor times: no truth was asked for, and this adapter cannot time what it draws."
-        label, ms = min(timed, key=lambda pair: pair[1])
-        return f"{label} is the fastest ({milliseconds(ms)}). No truth was asked for, so there are no errors."
-    kind, key = judged
-    errors = {r.label: e for r in candidates if (e := r.errors.get(kind, {}).get(key)) is not None}
+        label = min(timed, key=timed.__getitem__)
+        return f"{label} is the fastest ({milliseconds(timed[label])}). No truth was asked for, so there are no errors."
+    errors = {r.label: e for r in candidates if (e := judged_error(r, *judged))}
     if not errors:
-        return "No technique’s error could be measured: the truth holds no light of that kind."
+        return "No technique’s error could be measured."
     if not timed:
-        label = min(errors, key=errors.__getitem__)
-        return f"{label} is the most accurate ({percent(errors[label])} error). This adapter cannot time what it draws."
-    points = [(label, ms, errors[label]) for label, ms in timed if label in errors]
-    figures = {label: f"{milliseconds(ms)}, {percent(error)} error" for label, ms, error in points}
-    best = front(points)
-    if len(points) == 1:
-        return f"{best[0]}: {figures[best[0]]}." + _warning(study, kind, key, errors)
-    if len(best) == 1:
-        text = f"{best[0]} is both the fastest and the most accurate of {len(points)} techniques: {figures[best[0]]}."
-        return text + _warning(study, kind, key, errors)
-    text = f"On the Pareto front: {listed([f'{label} ({figures[label]})' for label in best])}."
-    losers: dict[str, list[str]] = {}
-    for label, ms, error in points:
-        if label not in best:  # then one on the front is at least as good at both; the most accurate one is named
-            winner = [name for name, t, e in points if name in best and t <= ms and e <= error]
-            losers.setdefault(min(winner, key=errors.__getitem__), []).append(label)
-    text += "".join(
-        f" {winner} is both faster and more accurate than {listed(names)}." for winner, names in losers.items()
-    )
-    return text + _warning(study, kind, key, errors)
+        label = min(errors, key=lambda name: errors[name].rank)
+        return f"{label} is the most accurate ({errors[label]} error). This adapter cannot time what it draws."
+    figures = {label: f"{milliseconds(timed[label])}, {errors[label]} error" for label in errors if label in timed}
+    names = best(study)
+    if len(figures) == 1:
+        return f"{names[0]}: {figures[names[0]]}."
+    if len(names) == 1:
+        tied = any(errors[label].rank == errors[names[0]].rank for label in figures if label not in names)
+        accuracy = "no technique is known to be more accurate than it" if tied else "the most accurate"
+        return f"{names[0]} is the fastest of {len(figures)} techniques, and {accuracy}: {figures[names[0]]}."
+    return f"On the Pareto front: {listed([f'{label} ({figures[label]})' for label in names])}."
 
 
-def _warning(study: Study, kind: str, key: str, errors: Mapping[str, float]) -> str:
-    """Which techniques are further from the truth than no light at all, and what a factor would mend."""
-    nothing = [
-        e for r in study.results if r.technique == BASELINE and (e := r.errors.get(kind, {}).get(key)) is not None
-    ]
-    worse = [label for label, error in errors.items() if nothing and error > nothing[0]]
-    text = (
-        f" No light at all would be nearer to the truth ({percent(nothing[0])}) than {listed(worse)}." if worse else ""
-    )
+def remarks(study: Study) -> list[str]:
+    """What else the figures say: who loses to whom, what the truth’s noise hides, and what a factor would mend."""
+    judged = main_metric(study)
+    if judged is None:
+        return []
+    kind, key = judged
+    errors = {r.label: e for r in study.results if (e := judged_error(r, kind, key))}
+    candidates = {r.label: r.gpu_ms.median for r in study.results if r.gpu_ms and r.technique != BASELINE}
+    names, text = best(study), []
+    losers: dict[tuple[str, bool], list[str]] = {}
+    for label in candidates:
+        if label in names or label not in errors:
+            continue
+        better = [n for n in names if candidates[n] <= candidates[label] and errors[n].rank <= errors[label].rank]
+        winner = min(better, key=lambda n: errors[n].rank)
+        losers.setdefault((winner, errors[winner].rank == errors[label].rank), []).append(label)
+    for (winner, tied), beaten in losers.items():
+        what = "faster than" if tied else "both faster and more accurate than"
+        text.append(f"{winner} is {what} {listed(beaten)}{', at an error that cannot be told apart' if tied else ''}.")
+    nothing = next((errors[r.label] for r in study.results if r.technique == BASELINE and r.label in errors), None)
+    worse = [label for label, error in errors.items() if nothing and error.rank > nothing.value]
+    if worse:
+        text.append(f"No light at all would be nearer to the truth ({nothing}) than {listed(worse)}.")
     for result in study.results:
         scores = result.errors.get(kind, {})
         left, factor = scores.get("scaled_rel_rmse"), scores.get("best_scale")
         if result.up_to_scale and left is not None and factor is not None:
             times = significant(factor, 2)
-            text += f" {result.label} is right up to a factor only: times {times} its error is {percent(left)}."
+            text.append(f"{result.label} is right up to a factor only: times {times}, its error is {percent(left)}.")
+    noise = study.reference.relative_error.get(kind) if study.reference else None
+    if noise:
+        hidden = [label for label, error in errors.items() if error.hidden]
+        end = f", which hides the error of {listed(hidden)}" if hidden else ""
+        text.append(f"The truth’s own standard error is {percent(noise)}{end}.")
     return text
-
-
-def doubt(study: Study) -> str | None:
-    """What the truth says of itself: its standard error, and which techniques it cannot tell from right."""
-    truth, judged = study.reference, main_metric(study)
-    if truth is None or judged is None:
-        return None
-    kind, _ = judged
-    noise = truth.relative_error.get(kind)
-    if not noise:
-        return None
-    text = f"Truth’s own standard error: {percent(noise)}"
-    within = [r.label for r in study.results if r.errors.get(kind, {}).get("within_noise")]
-    if within:
-        text += f"; within it, {listed(within)} cannot be told from right"
-    return text + "."
 
 
 def listed(names: Sequence[str]) -> str:
@@ -221,9 +252,9 @@ def milliseconds(ms: float) -> str:
     return f"{significant(ms, 3)}\u00a0ms"
 
 
-def percent(fraction: float) -> str:
-    """A fraction as a percentage of two or three digits."""
-    return f"{significant(100 * fraction, 3 if abs(fraction) >= 1 else 2)}\u00a0%"
+def percent(fraction: float, digits: int | None = None) -> str:
+    """A fraction as a percentage of so many digits; by itself of three from 100 % on, else of two."""
+    return f"{significant(100 * fraction, digits or (3 if abs(fraction) >= 1 else 2))}\u00a0%"
 
 
 def significant(value: float, digits: int) -> str:
