@@ -104,7 +104,7 @@ def measure(gpu: Gpu, name: str, scene: Scene, size: tuple[int, int], repeat: in
         gpu.wait()
         first = time.perf_counter() - begin
         builds = []
-        for _ in range(3):
+        for _ in range(8):
             gpu.wait()
             begin = time.perf_counter()
             world.build()

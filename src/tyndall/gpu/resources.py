@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import TracebackType
 from typing import Any, Self
 
@@ -91,6 +91,11 @@ class Bound:
 
     def __init__(self, slot: Slot, native: Any) -> None:
         self.slot, self.native, self.key = slot, native, next(_serial)
+
+    def declaring(self, **constants: bool) -> Bound:
+        """The same, with constants that shaders may import beside it: branches on them cost nothing."""
+        lines = "".join(f"const {name} = {str(value).lower()};\n" for name, value in constants.items())
+        return Bound(replace(self.slot, preamble=self.slot.preamble + lines), self.native)
 
 
 @dataclass(frozen=True)

@@ -47,6 +47,11 @@ class Layout:
     leaves: int
     groups: int
 
+    @property
+    def instanced(self) -> bool:
+        """Whether a ray may have to enter another space than the world's."""
+        return bool((self.hanging < len(self.instances) - 1).any())
+
 
 def arrange(
     scene: Scene,

@@ -26,7 +26,7 @@ from tyndall.tracing.layout import arrange, is_flat, place
 _RAYS = "package::tracing::rays"
 _MASKED = "package::tracing::masked"
 _BUILD = "package::tracing::build"
-_NOTHING = 0xFFFFFFFF
+_END = 0xBFFFFFFF  # as tracing/rays.wesl has it
 _MAX_LEAVES = 1 << 30  # a reference has two bits for other things
 _WRAP = {"repeat": 0, "clamp": 1, "mirror": 2}
 
@@ -73,11 +73,11 @@ class World(Closing):
         gpu, layout, meshes = self._gpu, self._layout, self._meshes
         if layout.leaves > _MAX_LEAVES:
             raise GpuError(f"tracing: {layout.leaves:,} triangles; {_MAX_LEAVES:,} can be numbered")
-        self._root = self._buffer("root", np.full(4, _NOTHING, np.uint32))
+        self._root = self._buffer("root", np.full(4, _END, np.uint32))
         self._instances = self._buffer("instances", layout.instances, f"{_RAYS}::Placed")
         self._nodes = self._buffer("nodes", 64 * (layout.leaves + len(layout.instances)), f"{_RAYS}::Node")
         self._triangles = self._buffer("triangles", 48 * max(1, layout.leaves), f"{_RAYS}::Triangle")
-        self._roots = self._buffer("roots", np.full(len(layout.boxes), _NOTHING, np.uint32))
+        self._roots = self._buffer("roots", np.full(len(layout.boxes), _END, np.uint32))
         self._boxes = self._buffer("boxes", layout.boxes, f"{_BUILD}::Box")
         rows = np.zeros(max(1, len(meshes.placed)), gpu.dtype(f"{_MASKED}::TracedMesh"))
         for row, (mesh, (_, vertex)) in zip(rows, meshes.placed.items(), strict=False):
@@ -87,7 +87,10 @@ class World(Closing):
         self._hanging = self._buffer("hanging", layout.hanging)
         self._box = self._buffer("box", layout.box, f"{_BUILD}::Box")
         self.bindings: dict[str, Any] = {
-            "trace_root": self._root.read(),
+            "trace_root": self._root.read().declaring(
+                TRACE_INSTANCED=layout.instanced,
+                TRACE_MASKED=any(m.alpha_mode == "mask" for m in meshes.material_list),
+            ),
             "trace_nodes": self._nodes.split(),
             "trace_triangles": self._triangles.split(),
             "trace_instances": self._instances.split(),
