@@ -11,6 +11,7 @@ import pytest
 from tyndall.frame import Renderer
 from tyndall.gpu.device import Gpu
 from tyndall.gpu.params import fields_of
+from tyndall.lab.truth import TruthSettings, trace
 from tyndall.scene.model import (
     DirectionalLight,
     Image,
@@ -63,7 +64,7 @@ def variants(family: str) -> list[tuple[str, dict[str, object]]]:
 
 
 def test_every_entry_point_compiles_and_is_used(gpu: Gpu) -> None:
-    """Draws with each technique of each family, all kinds of light and of material; then nothing may be left over."""
+    """Draws with each technique, all kinds of light and of material, and traces; then nothing may be left over."""
     drawn = 0
     for lights in (LIGHTS, LIGHTS[:1]):
         scene = Scene(SHAPES, lights, props.AHEAD, Medium(0.1, 0.02))
@@ -82,9 +83,11 @@ def test_every_entry_point_compiles_and_is_used(gpu: Gpu) -> None:
                     drawn += 1
                 renderer.use(family, start[family])
     assert drawn >= 2 * 10
+    for depth in (2, 3):
+        trace(scene, (8, 6), TruthSettings(target=1, depth=depth), gpu=gpu, cache=False)
     compiled = {(key[0], entry) for key in gpu._programs for entry in key[1]}
     left = entry_points(gpu) - compiled
-    assert not left, f"never compiled by any technique: {sorted(left)}"
+    assert not left, f"never compiled by any technique or truth: {sorted(left)}"
 
 
 def test_entry_points_are_found(gpu: Gpu) -> None:
