@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -393,8 +393,13 @@ def module(gpu: Gpu, name: str, text: str) -> Iterator[str]:
         linker.__dict__.pop("_compiler", None)
 
 
-def evaluate(gpu: Gpu, name: str, text: str, inputs: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Run ``fn evaluate(x: vec4f) -> vec4f`` of a WESL text on rows (N, 4); the module's name must be new."""
+def evaluate(
+    gpu: Gpu, name: str, text: str, inputs: NDArray[np.float32], scope: Mapping[str, Any] | None = None
+) -> NDArray[np.float32]:
+    """Run ``fn evaluate(x: vec4f) -> vec4f`` of a WESL text on rows (N, 4); the module's name must be new.
+
+    ``scope`` binds what the text imports from ``package::bindings``.
+    """
     rows = np.ascontiguousarray(inputs, np.float32)
     source = gpu.buffer("test.in", rows, owner="test", element="vec4f")
     target = gpu.buffer("test.out", rows.nbytes, owner="test", element="vec4f")
@@ -410,7 +415,7 @@ def evaluate(gpu: Gpu, name: str, text: str, inputs: NDArray[np.float32]) -> NDA
     imports, rest = _split_imports(text)
     try:
         with module(gpu, name, imports + body + rest) as path:
-            gpu.compute(name, path).bind(inputs=source.read(), outputs=target.read_write()).dispatch(len(rows))
+            gpu.compute(name, path).bind(scope, inputs=source.read(), outputs=target.read_write()).dispatch(len(rows))
             raw = gpu.read_buffer(target)
     finally:
         source.destroy()
