@@ -23,7 +23,7 @@ SHELL = 3e-4  # by how much the medium's box is larger than told, relative to it
 
 def register(mi: Any, dr: Any, content: dict[str, Any], images: dict[str, NDArray[np.uint8]]) -> None:
     """Make Mitsuba know Tyndall's plugins; each takes the index of what it stands for."""
-    ambient = content["ambient"]
+    ambient, last = content["ambient"], content["depth"] == 2
     read = _map(mi, dr)
     reflection, glow, lamp = _reflection(mi, dr, read), _glow(mi, dr, read), _lamp(mi, dr, content)
 
@@ -31,7 +31,7 @@ def register(mi: Any, dr: Any, content: dict[str, Any], images: dict[str, NDArra
         found: dict[str, Any] = content["materials"][int(props["index"])]
         return found
 
-    mi.register_bsdf("tyndall_reflection", lambda props: reflection(props, material(props), images, ambient))
+    mi.register_bsdf("tyndall_reflection", lambda props: reflection(props, material(props), images, ambient, last))
     mi.register_emitter("tyndall_glow", lambda props: glow(props, material(props), images))
     mi.register_emitter("tyndall_lamp", lambda props: lamp(props, content["lights"][int(props["index"])]))
     mi.register_phase("tyndall_phase", _phase(mi, dr))
@@ -47,23 +47,34 @@ def phase_dict(phase: dict[str, Any]) -> dict[str, Any]:
     return {"type": "tyndall_phase", "gibbons": kind == "gibbons", "k": phase["parameter"]}
 
 
+class Box:
+    """An axis-aligned box for rays; all of space without bounds."""
+
+    def __init__(self, mi: Any, dr: Any, bounds: Any) -> None:
+        self._dr, self.everywhere = dr, bounds is None
+        if not self.everywhere:
+            self._low, self._high = (mi.Point3f([float(x) for x in corner]) for corner in bounds)
+
+    def interval(self, origin: Any, way: Any, limit: Any) -> tuple[Any, Any]:
+        """(begin, end) of the part of a ray from 0 to ``limit`` that is inside, begin ≤ end."""
+        if self.everywhere:
+            return limit * 0, limit
+        dr = self._dr
+        safe = dr.select(dr.abs(way) < 1e-20, 1e-20, way)
+        a, b = (self._low - origin) / safe, (self._high - origin) / safe
+        begin = dr.maximum(dr.max(dr.minimum(a, b)), 0)
+        end = dr.minimum(dr.min(dr.maximum(a, b)), limit)
+        return begin, dr.maximum(begin, end)
+
+    def contains(self, p: Any) -> Any:
+        return self.everywhere or self._dr.all((p > self._low) & (p < self._high))
+
+
 def enlarged(bounds: Sequence[Sequence[float]]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Lower and upper corner of the medium's box as Mitsuba gets it."""
     low, high = np.array(bounds, np.float64)
     margin = SHELL * (1 + max(np.abs(low).max(), np.abs(high).max()))
     return low - margin, high + margin
-
-
-def inside_box(mi: Any, dr: Any, bounds: Any, origin: Any, way: Any, limit: Any) -> tuple[Any, Any]:
-    """(begin, end) of the part of a ray from 0 to ``limit`` that is in a box, begin ≤ end; all of it without a box."""
-    if bounds is None:
-        return limit * 0, limit
-    low, high = (mi.Point3f([float(x) for x in corner]) for corner in bounds)
-    safe = dr.select(dr.abs(way) < 1e-20, 1e-20, way)
-    a, b = (low - origin) / safe, (high - origin) / safe
-    begin = dr.maximum(dr.max(dr.minimum(a, b)), 0)
-    end = dr.minimum(dr.min(dr.maximum(a, b)), limit)
-    return begin, dr.maximum(begin, end)
 
 
 def _map(mi: Any, dr: Any) -> Callable[..., Any]:
@@ -114,9 +125,13 @@ def _reflection(mi: Any, dr: Any, read: Callable[..., Any]) -> Callable[..., Any
     """A material: wesl/brdf.wesl with its textures, lit from the side that is seen."""
 
     class Reflection(mi.BSDF):  # type: ignore[misc, name-defined, unused-ignore]
-        def __init__(self, props: Any, material: dict[str, Any], images: Any, ambient: Sequence[float]) -> None:
+        """``last``: paths end here, and directions are drawn for nothing."""
+
+        def __init__(
+            self, props: Any, material: dict[str, Any], images: Any, ambient: Sequence[float], last: bool
+        ) -> None:
             super().__init__(props)
-            self.given, self.ambient = material, ambient
+            self.given, self.ambient, self.last = material, ambient, last
             self.maps = {name: read(given, images) for name, given in material["maps"].items()}
             sides = mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide
             self.m_components = [mi.BSDFFlags.GlossyReflection | sides]
@@ -133,9 +148,10 @@ def _reflection(mi: Any, dr: Any, read: Callable[..., Any]) -> Callable[..., Any
                 color, alpha = color * mi.Color3f(texel[0], texel[1], texel[2]), alpha * texel[3]
             return color, alpha
 
-        def hole(self, si: Any) -> Any:
+        def solid(self, si: Any) -> Any:
+            """Not a hole."""
             cutoff = self.given["alpha_cutoff"]
-            return self.base(si)[1] < cutoff if cutoff > 0 else mi.Bool(False)
+            return self.base(si)[1] >= cutoff if cutoff > 0 else mi.Bool(True)
 
         def surface(self, si: Any) -> tuple[Any, Any, Any, Any]:
             """Normal on the viewer's side, colour, metallic, roughness."""
@@ -170,24 +186,18 @@ def _reflection(mi: Any, dr: Any, read: Callable[..., Any]) -> Callable[..., Any
             """How often a direction is drawn from the gloss."""
             return 0.5 + 0.4 * metallic
 
-        def evaluate(self, si: Any, wo: Any) -> tuple[Any, Any]:
-            """reflect_light of wesl/brdf.wesl, and the density of :meth:`sample`."""
+        def value(self, si: Any, wo: Any) -> Any:
+            """reflect_light of wesl/brdf.wesl; 0 beneath the true face, which a shading normal may let through."""
             normal, albedo, metallic, roughness = self.surface(si)
             viewer, light = si.to_world(si.wi), si.to_world(wo)
-            n_l = dr.dot(normal, light)
-            n_v = dr.maximum(dr.abs(dr.dot(normal, viewer)), 1e-4)
-            h = dr.normalize(viewer + light)
+            n_l, n_v, _, l_h, ggx = self.angles(normal, roughness, viewer, light)
             alpha = dr.maximum(roughness * roughness, 2e-3)
             a2 = alpha * alpha
-            n_h = dr.clip(dr.dot(normal, h), 0, 1)
-            l_h = dr.dot(light, h)
 
             def grazing(cosine: Any) -> Any:
                 m = dr.clip(1 - cosine, 0, 1)
                 return m * m * m * m * m
 
-            d = n_h * n_h * (a2 - 1) + 1
-            ggx = a2 / (dr.pi * d * d)
             smith = 0.5 / dr.maximum(
                 n_l * dr.sqrt(n_v * n_v * (1 - a2) + a2) + n_v * dr.sqrt(n_l * n_l * (1 - a2) + a2), 1e-7
             )
@@ -196,14 +206,37 @@ def _reflection(mi: Any, dr: Any, read: Callable[..., Any]) -> Callable[..., Any
             gloss = 1 - roughness
             through = 0.96 / (1 - gloss / 21) * (1 - gloss * grazing(n_l)) * (1 - gloss * grazing(n_v))
             value = (albedo * (through * (1 - metallic) / dr.pi) + fresnel * (ggx * smith)) * n_l
+            lit = (n_l > 0) & (dr.dot(si.n, light) * dr.dot(si.n, viewer) > 0) & self.solid(si)
+            return dr.select(lit, value, 0)
+
+        def density(self, si: Any, wo: Any) -> Any:
+            """Of :meth:`sample`'s directions."""
+            normal, _, metallic, roughness = self.surface(si)
+            n_l, _, n_h, l_h, ggx = self.angles(normal, roughness, si.to_world(si.wi), si.to_world(wo))
             share = self.gloss_share(metallic)
-            facet = dr.select(dr.dot(normal, h) > 0, ggx * n_h / dr.maximum(4 * dr.abs(l_h), 1e-9), 0)
-            density = share * facet + (1 - share) * n_l / dr.pi
-            # What a shading normal lets through beneath the true face is absorbed.
-            lit = (n_l > 0) & (dr.dot(si.n, light) * dr.dot(si.n, viewer) > 0)
-            return dr.select(lit, value, 0), dr.select(lit, density, 0)
+            facet = ggx * n_h / dr.maximum(4 * dr.abs(l_h), 1e-9)
+            return dr.select((n_l > 0) & self.solid(si), share * facet + (1 - share) * n_l / dr.pi, 0)
+
+        def angles(self, normal: Any, roughness: Any, viewer: Any, light: Any) -> tuple[Any, Any, Any, Any, Any]:
+            """n·l, n·v, n·h, l·h, and the density of microfacets (GGX) there."""
+            h = dr.normalize(viewer + light)
+            n_v = dr.maximum(dr.abs(dr.dot(normal, viewer)), 1e-4)
+            n_h = dr.clip(dr.dot(normal, h), 0, 1)
+            alpha = dr.maximum(roughness * roughness, 2e-3)
+            d = n_h * n_h * (alpha * alpha - 1) + 1
+            return dr.dot(normal, light), n_v, n_h, dr.dot(light, h), alpha * alpha / (dr.pi * d * d)
 
         def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any = True) -> tuple[Any, Any]:
+            solid = self.solid(si)
+            drawn = mi.BSDFSample3f()
+            drawn.eta = 1.0
+            drawn.sampled_component = dr.select(solid, mi.UInt32(0), mi.UInt32(1))
+            drawn.sampled_type = dr.select(
+                solid, mi.UInt32(int(mi.BSDFFlags.GlossyReflection)), mi.UInt32(int(mi.BSDFFlags.Null))
+            )
+            if self.last:
+                drawn.wo, drawn.pdf = -si.wi, dr.select(solid, mi.Float(0), mi.Float(1))
+                return drawn, dr.select(solid, mi.Color3f(0), mi.Color3f(1))
             normal, _, metallic, roughness = self.surface(si)
             viewer = si.to_world(si.wi)
             frame = mi.Frame3f(normal)
@@ -216,32 +249,23 @@ def _reflection(mi: Any, dr: Any, read: Callable[..., Any]) -> Callable[..., Any
             mirrored = 2 * dr.dot(viewer, h) * h - viewer
             matte = frame.to_world(mi.warp.square_to_cosine_hemisphere(sample2))
             wo = si.to_local(dr.select(sample1 < self.gloss_share(metallic), mirrored, matte))
-            value, density = self.evaluate(si, wo)
-            drawn = mi.BSDFSample3f()
-            hole = self.hole(si)
-            drawn.wo = dr.select(hole, -si.wi, wo)
-            drawn.pdf = dr.select(hole, 1, density)
-            drawn.eta = 1.0
-            drawn.sampled_component = dr.select(hole, mi.UInt32(1), mi.UInt32(0))
-            drawn.sampled_type = dr.select(
-                hole, mi.UInt32(int(mi.BSDFFlags.Null)), mi.UInt32(int(mi.BSDFFlags.GlossyReflection))
-            )
-            weight = dr.select(density > 0, value / dr.maximum(density, 1e-30), 0)
-            return drawn, dr.select(hole, 1, weight)
+            density = self.density(si, wo)
+            drawn.wo = dr.select(solid, wo, -si.wi)
+            drawn.pdf = dr.select(solid, density, 1)
+            weight = dr.select(density > 0, self.value(si, wo) / dr.maximum(density, 1e-30), 0)
+            return drawn, dr.select(solid, weight, 1)
 
         def eval(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
-            return self.eval_pdf(ctx, si, wo, active)[0]
+            return self.value(si, wo)
 
         def pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
-            return self.eval_pdf(ctx, si, wo, active)[1]
+            return self.density(si, wo)
 
         def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> tuple[Any, Any]:
-            value, density = self.evaluate(si, wo)
-            hole = self.hole(si)
-            return dr.select(hole, 0, value), dr.select(hole, 0, density)
+            return self.value(si, wo), self.density(si, wo)
 
         def eval_null_transmission(self, si: Any, active: Any = True) -> Any:
-            return mi.Color3f(dr.select(self.hole(si), 1, 0))
+            return mi.Color3f(dr.select(self.solid(si), 0, 1))
 
         def has_attribute(self, name: str, active: Any = True) -> Any:
             return mi.Bool(name in ("emitted", "double_sided"))
@@ -304,6 +328,8 @@ def _lamp(mi: Any, dr: Any, content: dict[str, Any]) -> Callable[..., Any]:
     size = float(np.linalg.norm(high - low)) or 1.0
     # A shadow ray stops short of its end by this factor.
     stretch = 1 / (1 - mi.math.ShadowEpsilon)
+    world = Box(mi, dr, (low - 1e-3 * size, high + 1e-3 * size))
+    air = Box(mi, dr, medium and medium["bounds"] and enlarged(medium["bounds"]))
 
     class Lamp(mi.Emitter):  # type: ignore[misc, name-defined, unused-ignore]
         def __init__(self, props: Any, light: dict[str, Any]) -> None:
@@ -342,11 +368,10 @@ def _lamp(mi: Any, dr: Any, content: dict[str, Any]) -> Callable[..., Any]:
                 axis = mi.Frame3f(axis).to_world(local)
             if given["kind"] == "directional":
                 # Nothing can be in the way beyond the scene.
-                _, distance = inside_box(mi, dr, (low - 1e-3 * size, high + 1e-3 * size), it.p, axis, FAR)
+                _, distance = world.interval(it.p, axis, FAR)
                 distance = distance + 1e-3 * size
                 if medium:
-                    box = medium["bounds"] and enlarged(medium["bounds"])
-                    begin, end = inside_box(mi, dr, box, it.p, axis, distance)
+                    begin, end = air.interval(it.p, axis, distance)
                     light = light * dr.exp(mi.Color3f(medium["extinction"]) * (end - begin))
             ds = mi.DirectionSample3f()
             ds.p = it.p + axis * (distance * stretch)

@@ -30,7 +30,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tyndall.lab.mitsuba_plugins import FAR, enlarged, inside_box, phase_dict, register
+from tyndall.lab.mitsuba_plugins import FAR, Box, enlarged, phase_dict, register
 
 LANES = {"cuda": 1 << 24, "llvm": 1 << 19}  # samples in one launch
 LEAST = 32  # samples a pixel before an error is believed
@@ -235,9 +235,13 @@ class Tracer:
         self.mi, self.dr, self.content = mi, dr, content
         self.scalar = mi.variant().startswith("scalar")
         self.culled = 0.0
+        self._sights: dict[int, dict[str, Any]] = {}
         images = dict(np.load(folder / "images.npz")) if (folder / "images.npz").exists() else {}
         medium = content["medium"]
         self.medium: Any = None
+        self.air = Box(mi, dr, medium and medium["bounds"])
+        self.solid_air = Box(mi, dr, None)  # as Mitsuba has it
+        self.may_be_outside = False
         scene: dict[str, Any] = {"type": "scene"}
         register(mi, dr, content, images)
         for index, _ in enumerate(content["lights"]):
@@ -260,6 +264,9 @@ class Tracer:
             )
             if medium["bounds"] is not None:
                 low, high = enlarged(medium["bounds"])
+                self.solid_air = Box(mi, dr, (low, high))
+                scene_low, scene_high = np.array(content["bounds"])
+                self.may_be_outside = bool((scene_low < low).any() or (scene_high > high).any())
                 transform = mi.ScalarTransform4f()
                 scene["medium"] = {
                     "type": "cube",
@@ -358,31 +365,49 @@ class Tracer:
 
     def _sample(self, pixel: Any) -> tuple[Any, Any, Any]:
         """(L_v, T·L_b, whether a culled face was met) of one sample of pixels."""
+        sight = self._sights.get(pixel) if self.scalar else None
+        if sight is None:
+            sight = self._sight(pixel)
+            if self.scalar and self.content["filter"] == "centre" and sight["parts"] == 1:
+                self._sights[pixel] = sight  # no chance in it: the same for all samples
+        surfaces = sight["emitted"] + sight["dimmed"] * self._reflected(sight)
+        inscattered = self.mi.Color3f(0.0)
+        if self.medium is not None and any(self.content["medium"]["scattering"]):
+            inscattered = self._light(sight["air"], self.medium, sight["has_air"]) * sight["air_weight"]
+        return inscattered, surfaces, sight["culled"]
+
+    def _sight(self, pixel: Any) -> dict[str, Any]:
+        """What is known without light's transport: the surface a camera ray meets, and the air in front."""
         mi, dr, content = self.mi, self.dr, self.content
         jitter = self.sampler.next_2d() if content["filter"] == "box" else mi.Point2f(0.5, 0.5)
         origin, way, stretch = self._camera_ray(pixel, jitter.x, jitter.y)
         seen = self._look(origin, way, content["camera"]["near"] * stretch)
         hit, end = seen["hit"], dr.select(seen["hit"], seen["t"], FAR)
+        begin, leave = self.air.interval(origin, way, end)
+        emitted = mi.Color3f(content["background"])
+        if not self.scalar or hit:
+            emitted = dr.select(hit, seen["si"].bsdf().eval_attribute_3("emitted", seen["si"], hit), emitted)
+        emitted = emitted * self._dimmed(leave - begin)
 
         before = end * (1 - GAP)
-        begin, leave = self._inside(origin, way, end)
-        emitted = dr.select(
-            hit,
-            self._emitted(seen["si"], hit) * self._dimmed(leave - begin),
-            mi.Color3f(content["background"]) * self._dimmed(leave - begin),
-        )
-        begin, leave = self._inside(origin, way, before)
-        surfaces = emitted + self._dimmed(leave - begin) * self._reflected(origin, way, before, hit)
-        inscattered = mi.Color3f(0.0)
-        if self.medium is not None and any(content["medium"]["scattering"]):
-            # One of the parts between holes and culled faces: a ray forgets its end when it passes through a hole.
-            first = dr.maximum(begin, seen["first"])
-            last = dr.minimum(leave, seen["last"] * (1 - GAP))
-            ahead = mi.RayDifferential3f(mi.Ray3f(origin + way * first, way, last - first, 0.0, mi.Color0f()))
-            there = last > first
-            light = self._light(ahead, self.medium, there)
-            inscattered = light * self._dimmed(first - begin) * seen["parts"]
-        return inscattered, surfaces, seen["culled"]
+        begin, leave = self.air.interval(origin, way, before)
+        position = origin + way * before
+        in_air = self.solid_air.contains(position)
+        # One of the parts between holes and culled faces: a ray forgets its end when it passes through a hole.
+        first = dr.maximum(begin, seen["first"] * (1 + STEP))
+        last = dr.minimum(leave, seen["last"] * (1 - GAP))
+        return {
+            "culled": seen["culled"],
+            "parts": seen["parts"],
+            "emitted": emitted,
+            "dimmed": self._dimmed(leave - begin),
+            "ray": mi.RayDifferential3f(mi.Ray3f(position, way)),
+            "hit_in_air": hit & in_air,
+            "hit_outside": hit & (in_air == False),  # noqa: E712 - of a scalar, too
+            "air": mi.RayDifferential3f(mi.Ray3f(origin + way * first, way, last - first, 0.0, mi.Color0f())),
+            "has_air": last > first,
+            "air_weight": self._dimmed(first - begin) * seen["parts"],
+        }
 
     def _light(self, ray: Any, medium: Any, active: Any) -> Any:
         mi, dr = self.mi, self.dr
@@ -391,36 +416,12 @@ class Tracer:
         light, _, _ = self.integrator.sample(self.scene, self.sampler, ray, medium, active)
         return dr.select(active, light, 0.0)
 
-    def _reflected(self, origin: Any, way: Any, before: Any, hit: Any) -> Any:
+    def _reflected(self, sight: dict[str, Any]) -> Any:
         """Light that a surface reflects towards the eye, seen from just before it."""
-        mi, dr = self.mi, self.dr
-        position = origin + way * before
-        ray = mi.RayDifferential3f(mi.Ray3f(position, way))
-        if self.medium is None:
-            return self._light(ray, None, hit)
-        bounds = self.content["medium"]["bounds"]
-        if bounds is None:
-            return self._light(ray, self.medium, hit)
-        low, high = enlarged(bounds)
-        inside = hit & dr.all((position > mi.Point3f(low)) & (position < mi.Point3f(high)))
-        light = self._light(ray, self.medium, inside)
-        scene_low, scene_high = np.array(self.content["bounds"])
-        if (scene_low >= low).all() and (scene_high <= high).all():
-            return light  # no surface is outside
-        return light + self._light(ray, None, hit & ~inside if not self.scalar else bool(hit and not inside))
-
-    def _emitted(self, si: Any, hit: Any) -> Any:
-        """Emissive + ambient light, of a surface seen by the eye."""
-        mi = self.mi
-        if self.scalar and not hit:
-            return mi.Color3f(0.0)
-        bsdf = si.bsdf()
-        return bsdf.eval_attribute_3("emitted", si, hit)
-
-    def _inside(self, origin: Any, way: Any, limit: Any) -> tuple[Any, Any]:
-        """Where a ray is inside the medium, as wesl/medium.wesl has it."""
-        medium = self.content["medium"]
-        return inside_box(self.mi, self.dr, medium and medium["bounds"], origin, way, limit)
+        light = self._light(sight["ray"], self.medium, sight["hit_in_air"])
+        if self.may_be_outside:
+            light = light + self._light(sight["ray"], None, sight["hit_outside"])
+        return light
 
     def _dimmed(self, length: Any) -> Any:
         """Beer–Lambert."""
@@ -450,19 +451,18 @@ class Tracer:
             back = solid & ~hole & (dr.dot(si.n, way) > 0) & (bsdf.eval_attribute_1("double_sided", si, solid) < 0.5)
             skipped = hole | back
             shown = solid & ~skipped
-            parted = skipped | air
-            last = dr.select(s["open"] & (parted | shown), t, s["last"])
-            parts = dr.select(parted, s["parts"] + 1, s["parts"])
-            chosen = parted & (sampler.next_1d(s["active"]) * parts < 1)
+            last = dr.select(s["open"] & solid, t, s["last"])
+            parts = dr.select(skipped, s["parts"] + 1, s["parts"])
+            chosen = skipped & (sampler.next_1d(s["active"]) * parts < 1)
             return {
-                "from": dr.select(parted, origin + way * (t * (1 + STEP)), s["from"]),
-                "active": parted & (parts < 1000),
+                "from": dr.select(skipped | air, origin + way * (t * (1 + STEP)), s["from"]),
+                "active": (skipped | air) & (parts < 1000),
                 "hit": s["hit"] | shown,
                 "t": dr.select(shown, t, s["t"]),
                 "parts": parts,
                 "first": dr.select(chosen, t, s["first"]),
                 "last": dr.select(chosen, FAR, last),
-                "open": dr.select(parted | shown, chosen, s["open"]),
+                "open": dr.select(solid, chosen, s["open"]),
                 "culled": s["culled"] | back,
             }
 
@@ -471,17 +471,19 @@ class Tracer:
             if not si.is_valid():
                 return {**s, "active": False}
             t = dr.dot(si.p - origin, way)
-            air = si.is_medium_transition()
+            onward = {**s, "from": origin + way * (t * (1 + STEP))}
+            if si.is_medium_transition():
+                return onward
             bsdf = si.bsdf()
-            hole = not air and bsdf.eval_null_transmission(si).x > 0
-            back = not (air or hole) and dr.dot(si.n, way) > 0 and bsdf.eval_attribute_1("double_sided", si) < 0.5
-            s = {**s, "last": t if s["open"] else s["last"], "culled": s["culled"] or back, "open": False}
-            if not (air or hole or back):
-                return {**s, "hit": True, "t": t, "active": False}
-            s["parts"] += 1
-            if sampler.next_1d() * s["parts"] < 1:
-                s.update(first=t, last=FAR, open=True)
-            return {**s, "from": origin + way * (t * (1 + STEP)), "active": s["parts"] < 1000}
+            hole = bsdf.eval_null_transmission(si).x > 0
+            back = not hole and dr.dot(si.n, way) > 0 and bsdf.eval_attribute_1("double_sided", si) < 0.5
+            closed = {"last": t if s["open"] else s["last"], "open": False}
+            if not (hole or back):
+                return {**s, **closed, "hit": True, "t": t, "active": False}
+            parts = s["parts"] + 1
+            if sampler.next_1d() * parts < 1:
+                closed = {"first": t, "last": FAR, "open": True}
+            return {**onward, **closed, "parts": parts, "culled": s["culled"] or back, "active": parts < 1000}
 
         start = {
             "from": origin + way * near,
