@@ -51,7 +51,7 @@ Choice = str | Technique | Sequence[str | Technique] | None
 # 640×360 within a minute.
 _MEASURE_BUDGET_S = 2.0
 _FRAMES, _WARMUP = 64, 16
-_SOFT_FRAMES = 16
+SOFT_FRAMES = 16
 
 
 def compare(
@@ -267,7 +267,7 @@ def _draw(
         progress=tell.inside,
     )
     picture = stage.picture(technique.name)
-    still = stage.still(technique, frames=_SOFT_FRAMES if _is_soft(stage.scene) else 1)
+    still = stage.still(technique, frames=SOFT_FRAMES if is_soft(stage.scene) else 1)
     light: dict[str, metrics.Light] = {kind: still.of(kind) for kind in KINDS[family]}
     return _Drawn(label, technique, measurement, picture, still, light)
 
@@ -289,7 +289,7 @@ def _result(drawn: _Drawn, family: str, known: Standard | None, judged: dict[str
     )
 
 
-def _is_soft(scene: Scene) -> bool:
+def is_soft(scene: Scene) -> bool:
     """Whether a light has a size, so that its shadows are sampled."""
     return any(
         (light.angular_diameter if isinstance(light, DirectionalLight) else light.radius) > 0 for light in scene.lights
