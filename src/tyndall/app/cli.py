@@ -49,6 +49,7 @@ app.command()(sweep_command.sweep)
 SceneName = Annotated[str, typer.Argument(metavar="SCENE", help="A bundled scene, a scene JSON, or a mesh file.")]
 Size = Annotated[str, typer.Option(metavar="WxH", help="Width and height of the picture in pixels.")]
 Shadow = Annotated[str | None, typer.Option(metavar="NAME", help="Shadow technique.")]
+Occlusion = Annotated[str | None, typer.Option(metavar="NAME", help="Technique of ambient occlusion.")]
 Antialiasing = Annotated[str | None, typer.Option(metavar="NAME", help="Antialiasing technique.")]
 Tonemap = Annotated[str | None, typer.Option(metavar="NAME", help="Tone mapping.")]
 Model = Annotated[
@@ -99,6 +100,7 @@ def render(
     size: Size = "1280x720",
     technique: Annotated[str, typer.Option(metavar="NAME", help="Volumetric technique.")] = "froxel",
     shadow: Shadow = None,
+    occlusion: Occlusion = None,
     antialiasing: Antialiasing = None,
     tonemap: Tonemap = None,
     model: Model = None,
@@ -115,7 +117,8 @@ def render(
     if len(names) != 1:
         raise ParameterError(f"--technique: '{technique}' is not one technique; compare draws several")
     technique = names[0]
-    families = {"volumetric": technique, **_others(shadow=shadow, antialiasing=antialiasing, tonemap=tonemap)}
+    looks = {"occlusion": occlusion, "antialiasing": antialiasing, "tonemap": tonemap}
+    families = {"volumetric": technique, **_others(shadow=shadow, **looks)}
     parameters = _parameters(context.obj.flags, "volumetric", [technique], families, model)
     with console.Work("loading") as work:
         described = open_scene(scene, lights)
@@ -168,6 +171,7 @@ def compare(
     shadow: Annotated[
         str | None, typer.Option(metavar="NAME", help="Shadow technique, where volumetric light is compared.")
     ] = None,
+    occlusion: Occlusion = None,
     antialiasing: Antialiasing = None,
     tonemap: Tonemap = None,
     model: Annotated[
@@ -204,7 +208,8 @@ def compare(
     chosen = arguments.split_list(technique) if technique else None
     if chosen == []:
         raise ParameterError("--technique: no name is given")
-    others = _others(volumetric=volumetric, shadow=shadow, antialiasing=antialiasing, tonemap=tonemap)
+    looks = {"occlusion": occlusion, "antialiasing": antialiasing, "tonemap": tonemap}
+    others = _others(volumetric=volumetric, shadow=shadow, **looks)
     if family in others:
         raise ParameterError(f"--{family}: it is {family} techniques that are compared; --technique names them")
     if model is not None and family != "volumetric":
