@@ -25,6 +25,8 @@ from tyndall.scene.model import (
 )
 from tyndall.techniques import FAMILIES
 from tyndall.techniques.contract import Unsupported
+from tyndall.tracing.cast import blocked, cast
+from tyndall.tracing.world import World
 
 _ENTRY = re.compile(r"@(?:compute|vertex|fragment)\b(?:\s*@\w+(?:\([^)]*\))?)*\s*fn\s+(\w+)")
 SMALL = {"froxel": {"grid": (8, 6, 4)}, "march": {"steps": 4}, "shadow_map": {"size": 64}}
@@ -63,7 +65,7 @@ def variants(family: str) -> list[tuple[str, dict[str, object]]]:
     return found
 
 
-def test_every_entry_point_compiles_and_is_used(gpu: Gpu) -> None:
+def test_every_entry_point_compiles_and_is_used(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
     """Draws with each technique, all kinds of light and of material, and traces; then nothing may be left over."""
     drawn = 0
     for lights in (LIGHTS, LIGHTS[:1]):
@@ -85,9 +87,15 @@ def test_every_entry_point_compiles_and_is_used(gpu: Gpu) -> None:
     assert drawn >= 2 * 10
     for depth in (2, 3):
         trace(scene, (8, 6), TruthSettings(target=1, depth=depth), gpu=gpu, cache=False)
+    with World(gpu, scene, movable=True) as world:
+        world.move({0: _mirror})
+        cast(gpu, world, [[0, 0, 0]], [[0, 0, -1]])
+        blocked(gpu, world, [[0, 0, 0]], [[0, 0, -1]])
+    monkeypatch.setattr("tyndall.tracing.world.STACK", 0)
+    World(gpu, scene).close()
     compiled = {(key[0], entry) for key in gpu._programs for entry in key[1]}
     left = entry_points(gpu) - compiled
-    assert not left, f"never compiled by any technique or truth: {sorted(left)}"
+    assert not left, f"never compiled by a technique, the truth or rays: {sorted(left)}"
 
 
 def test_entry_points_are_found(gpu: Gpu) -> None:
