@@ -16,6 +16,8 @@ def test_the_page_holds_the_tables_of_every_result() -> None:
     script = runpy.run_path(str(ROOT / "benchmarks" / "update_docs.py"))
     page = script["PAGE"].read_text(encoding="utf-8")
     assert script["updated"](page) == page, "run python benchmarks/update_docs.py"
+    for path, text in script["images"]().items():
+        assert path.read_text(encoding="utf-8") == text, "run python benchmarks/update_docs.py"
 
 
 @pytest.mark.parametrize("path", RESULTS, ids=lambda path: path.stem)

@@ -1,49 +1,53 @@
 """The benchmark of the volumetric techniques, at the settings of the study that this project repeats.
 
-``tyndall bench volumetric`` measures, on one adapter and in one run of a few minutes:
+``tyndall bench volumetric`` is a sweep (:mod:`tyndall.lab.sweep`), on one adapter and in one run of a few minutes:
 
 - **scenes**: each technique in each bundled scene with one directional light: GPU time of its passes and of the frame,
   host time of the frame, and memory;
 - **lights**: each technique in ``box`` with 1 to 32 lights, with a straight line fitted to its time and its memory;
 - **resolution**: how each technique's error against the converged march falls, and its time and memory rise, with its
-  own resolution: froxels, shadow-map texels under the polygonal mesh, screen-space samples, march steps.
+  own resolution: froxels, shadow-map texels under the polygonal mesh, screen-space samples, march steps;
+- **truth**: the error of each technique, and of the converged march, against a traced truth, whose visibility comes
+  from rays and not from a shadow map.
 
 The settings are those of S1, *Comparison of volumetric-light techniques* (2025): 2134×1459 pixels, shadow maps of
 1024², 190×90×128 froxels, 64 screen-space samples; :mod:`tyndall.lab.bench_tables` sets its figures beside these,
-as those of another machine. ``quick`` measures the same things in small, for a test or a software adapter.
+as those of another machine. Errors against truth are of smaller pictures, as truth is dear. ``quick`` measures the same
+things in small, for a test or a software adapter.
+
+The rows are those of any sweep (``results.jsonl`` and a table), and a run that was stopped goes on where it was.
 """
 
 from __future__ import annotations
 
-import datetime
 import json
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tyndall.gpu.device import Gpu, GpuError
-from tyndall.gpu.params import replace
-from tyndall.lab import bench_tables, metrics
-from tyndall.lab.fingerprint import scene_hash, versions
-from tyndall.lab.measure import Measurement, measure
+from tyndall.gpu.device import Gpu, GpuError, choose_adapter
+from tyndall.lab import bench_tables
 from tyndall.lab.picture import check_folder, write_atomically
-from tyndall.lab.reference import Reference, find
-from tyndall.lab.stage import Overrides, Stage, adapter_name, describe, driver_name, make
+from tyndall.lab.stage import Overrides
+from tyndall.lab.sweep import sweep
+from tyndall.lab.sweep_spec import Plan, plan
 from tyndall.scene import bundled
-from tyndall.scene.model import Scene
-from tyndall.techniques.contract import Technique
 
 Progress = Callable[[float, str], object]
 Triple = tuple[int, int, int]
+Rows = Mapping[str, Mapping[str, Any]]
 
 # As measured: a technique, or "technique/choice" for another of its ways to do the same.
 TECHNIQUES = ("off", "froxel", "screen_space", "polygonal", "polygonal/faces", "march")
 _CHOICES: Mapping[str, Mapping[str, Any]] = {"faces": {"evaluate": "faces"}}
+_JUDGED = ("off", "screen_space", "froxel", "polygonal", "march")  # against truth; both ways of polygonal are one there
+
+NAME = "volumetric"
 
 
 @dataclass(frozen=True)
@@ -61,9 +65,15 @@ class Settings:
     shadow_sizes: tuple[int, ...] = (256, 512, 1024, 2048, 4096)
     sample_counts: tuple[int, ...] = (16, 32, 64, 128, 256)
     step_counts: tuple[int, ...] = (16, 32, 64, 128, 256)
-    frames: int = 200
-    warmup: int = 60
-    seconds: float = 5.0  # the most that one measurement may take; a GPU never needs it
+    truth_scenes: tuple[str, ...] = ("box", "blinds", "courtyard")
+    truth_size: tuple[int, int] = (640, 360)
+    truth_target: float = 0.01  # relative standard error
+    truth_seconds: float = 20.0  # the most that one truth may take
+    truth_steps: int = 2048  # of a march that has converged
+    truth_shadow_sizes: tuple[int, ...] = (1024, 4096)  # of the maps that it reads
+    frames: int = 120
+    warmup: int = 30
+    seconds: float = 3.0  # the most that one measurement may take; a GPU seldom needs it
 
     def parameters(self) -> Overrides:
         """Parameters of the techniques at these settings, by technique name."""
@@ -86,6 +96,11 @@ QUICK = Settings(
     shadow_sizes=(128, 256),
     sample_counts=(16, 32),
     step_counts=(16, 32),
+    truth_scenes=("box",),
+    truth_size=(160, 90),
+    truth_target=0.05,
+    truth_steps=256,
+    truth_shadow_sizes=(256, 1024),
     frames=4,
     warmup=1,
     seconds=2.0,
@@ -94,7 +109,7 @@ QUICK = Settings(
 
 @dataclass(frozen=True)
 class Bench:
-    """The figures of one run, as plain data (:meth:`to_json`), tables (:meth:`markdown`)."""
+    """The figures of one run, as plain data (:meth:`to_json`), tables (:meth:`markdown`) and plots (:meth:`plots`)."""
 
     document: Mapping[str, Any]
 
@@ -102,15 +117,19 @@ class Bench:
         """Ready for ``json.dumps``."""
         return dict(self.document)
 
-    def markdown(self) -> str:
-        """All tables, as they stand in ``docs/benchmarks.md``."""
-        return bench_tables.markdown(self.document)
+    def markdown(self, images: str | None = None) -> str:
+        """All tables, as they stand in ``docs/benchmarks.md``; with ``images``, links to plots whose names begin so."""
+        return bench_tables.markdown(self.document, images)
+
+    def plots(self) -> dict[str, str]:
+        """S1's figures 20 to 22 from these figures: SVG files by name."""
+        return bench_tables.plots(self.document)
 
     def __str__(self) -> str:
         return self.markdown()
 
     def save(self, folder: str | os.PathLike[str]) -> Path:
-        """Write ``volumetric.json`` and ``volumetric.md``.
+        """Write ``volumetric.json``, ``volumetric.md`` and its plots.
 
         Raises:
             OutputError: ``folder`` is a file, or the system refuses.
@@ -118,9 +137,11 @@ class Bench:
         target = Path(folder)
         check_folder(target)
         target.mkdir(parents=True, exist_ok=True)
-        text = json.dumps(self.document, indent=1, ensure_ascii=False) + "\n"
-        write_atomically(target / "volumetric.json", lambda path: _write(path, text))
-        write_atomically(target / "volumetric.md", lambda path: _write(path, self.markdown()))
+        files = {f"{NAME}.json": json.dumps(self.document, indent=1, ensure_ascii=False) + "\n"}
+        files |= {f"{NAME}-{name}.svg": text for name, text in self.plots().items()}
+        files[f"{NAME}.md"] = self.markdown(f"{NAME}-")
+        for name, text in files.items():
+            write_atomically(target / name, lambda path, text=text: _write(path, text))  # type: ignore[misc]
         return target
 
 
@@ -130,38 +151,98 @@ def volumetric(
     *,
     quick: bool = False,
     settings: Settings | None = None,
+    fresh: bool = False,
     progress: Progress | None = None,
 ) -> Bench:
-    """Measure everything that the module lists.
+    """Measure everything that the module lists, and what ``out`` does not have yet of it.
 
     Args:
-        adapter: part of an adapter's name, or a device to share.
-        out: folder for the figures as JSON and as tables, written again after each part, so that an interruption loses
-            one part only.
+        adapter: part of an adapter's name; or a device to share, and then this process measures, not a child of it.
+        out: folder for the rows, the figures as JSON, the tables and the plots.
         quick: :data:`QUICK` instead of S1's settings.
         settings: others than these two.
+        fresh: measure again what ``out`` already has.
         progress: hears a fraction of 1 and what is being measured.
 
     Raises:
-        GpuError: no such adapter, or one that cannot draw at these settings, or not time what it draws.
-        OutputError: ``out`` cannot be written.
+        GpuError: no such adapter, or one that cannot time what it draws, or nothing could be measured.
+        OutputError: ``out`` cannot be written, or another run writes there.
     """
+    chosen = settings or (QUICK if quick else Settings())
     if out is not None:
         check_folder(Path(out))
-    chosen = settings or (QUICK if quick else Settings())
-    owned = not isinstance(adapter, Gpu)
-    gpu = adapter if isinstance(adapter, Gpu) else Gpu(adapter)
-    try:
-        run = _Run(chosen, gpu, progress)
-        document = run.head()
-        for part, measured in (("scenes", run.scenes), ("lights", run.lights), ("resolution", run.resolution)):
-            document[part] = measured()
-            if out is not None:
-                Bench(document).save(out)
-        return Bench(document)
-    finally:
-        if owned:
-            gpu.close()
+    features = adapter.features if isinstance(adapter, Gpu) else choose_adapter(adapter).features
+    if "timestamp-query" not in features:
+        raise GpuError("this adapter cannot time what it draws (timestamp-query), and a benchmark is of times")
+    if progress:
+        progress(0.0, "reading the scenes")
+    planned = plan(spec(chosen))
+    with tempfile.TemporaryDirectory(prefix="tyndall-") as scratch:
+        workers = 0 if isinstance(adapter, Gpu) else 1
+        found = sweep(planned, out or scratch, workers=workers, adapter=adapter, fresh=fresh, progress=progress)
+    bench = Bench(_document(chosen, planned, {row["id"]: row for row in found.rows}))
+    if out is not None:
+        bench.save(out)
+    return bench
+
+
+def spec(settings: Settings) -> dict[str, Any]:
+    """The specification of the sweep; its parts are those of :func:`_parts`, in order."""
+    common = {
+        "sizes": [list(settings.size)],
+        "parameters": settings.parameters(),
+        "frames": settings.frames,
+        "warmup": settings.warmup,
+        "seconds": settings.seconds,
+        "metrics": "light",
+    }
+    made: dict[str, Any] = json.loads(json.dumps({**common, "parts": list(_parts(settings).values())}))
+    return made
+
+
+def _parts(s: Settings) -> dict[str, dict[str, Any]]:
+    """The parts of the sweep by name; one without scenes is left out."""
+    every = [_choice(label) for label in TECHNIQUES]
+    # The polygonal mesh has one vertex a texel, so its resolution is the map's. Its own error is against a march on the
+    # same map; the map's error comes on top, and shows against a march on the finest map.
+    maps = [{"technique": "shadow_map", "size": size} for size in s.shadow_sizes]
+    march = {"judge": "march", "seconds": 4 * s.seconds}
+    finest = {**march, "shadow": {"technique": "shadow_map", "size": max(s.shadow_sizes)}}
+    traced = {"judge": "traced", "target": s.truth_target, "seconds": s.truth_seconds}
+    small = {"sizes": [list(s.truth_size)], "truth": traced, "frames": 0, "metrics": "all"}
+    converged = {"technique": "march", "steps": s.truth_steps, "jitter": 0}
+    truth_maps = [{"technique": "shadow_map", "size": size} for size in s.truth_shadow_sizes]
+    parts: dict[str, dict[str, Any]] = {
+        "scenes": {"scenes": s.scenes, "techniques": every},
+        "lights": {"scenes": ["box"] if s.lights else [], "lights": s.lights, "techniques": every},
+        "froxel": {"scenes": s.error_scenes, "truth": march, "techniques": _over("froxel", "grid", s.grids)},
+        "screen_space": {
+            "scenes": s.error_scenes,
+            "truth": march,
+            "techniques": _over("screen_space", "samples", s.sample_counts),
+        },
+        "march": {"scenes": s.error_scenes, "truth": march, "techniques": _over("march", "steps", s.step_counts)},
+        "polygonal": {"scenes": s.error_scenes, "truth": march, "techniques": "polygonal", "shadow": maps},
+        "finest": {
+            "scenes": s.error_scenes,
+            "truth": finest,
+            "techniques": "polygonal",
+            "shadow": maps,
+            "frames": 0,
+        },
+        "truth": {**small, "scenes": s.truth_scenes, "techniques": list(_JUDGED)},
+        "converged": {**small, "scenes": s.truth_scenes, "techniques": converged, "shadow": truth_maps},
+    }
+    return {name: part for name, part in parts.items() if part["scenes"]}
+
+
+def _choice(label: str) -> dict[str, Any]:
+    name, _, choice = label.partition("/")
+    return {"technique": name, **_CHOICES.get(choice, {})}
+
+
+def _over(technique: str, parameter: str, values: Sequence[Any]) -> list[dict[str, Any]]:
+    return [{"technique": technique, parameter: value} for value in values]
 
 
 def line(x: Sequence[float], y: Sequence[float]) -> dict[str, float]:
@@ -177,183 +258,145 @@ def line(x: Sequence[float], y: Sequence[float]) -> dict[str, float]:
     }
 
 
-class _Run:
-    """One run: settings, device, and how far it is."""
+# --- rows as figures ----------------------------------------------------------------------------------------------
 
-    def __init__(self, settings: Settings, gpu: Gpu, progress: Progress | None) -> None:
-        self.settings, self.gpu, self._progress = settings, gpu, progress
-        self._made: dict[tuple[str, int], Scene] = {}
-        s = settings
-        sweeps = len(s.grids) + len(s.sample_counts) + 2 * len(s.shadow_sizes) + len(s.step_counts) + 2
-        self._total = len(TECHNIQUES) * (len(s.scenes) + len(s.lights)) + len(s.error_scenes) * sweeps
-        self._done = 0
 
-    def head(self) -> dict[str, Any]:
-        """What every figure depends on."""
-        s = self.settings
-        return {
-            "benchmark": "volumetric",
-            "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
-            "adapter": adapter_name(self.gpu),
-            "adapter_type": str(self.gpu.adapter_info["adapter_type"]),
-            "driver": driver_name(self.gpu),
-            "versions": versions(),
-            "settings": {
-                "size": list(s.size),
-                "shadow_size": s.shadow_size,
-                "grid": list(s.grid),
-                "samples": s.samples,
-                "frames": s.frames,
-                "warmup": s.warmup,
-            },
-        }
-
-    def scenes(self) -> list[dict[str, Any]]:
-        """Each technique in each scene."""
-        rows = []
-        for name in self.settings.scenes:
-            scene = self._scene(name)
-            digest = scene_hash(scene)
-            with self._stage(scene) as stage:
-                for label, technique in self._techniques(scene):
-                    self._tell(f"{name}, {label}")
-                    row = {"scene": name, "triangles": scene.triangle_count, "scene_hash": digest}
-                    rows.append({**row, **self._row(stage, technique), "technique": label})
-        return rows
-
-    def lights(self) -> dict[str, Any]:
-        """Each technique in box with more and more lights, and the lines through its time and memory."""
-        rows: dict[str, list[dict[str, Any]]] = {}
-        for count in self.settings.lights:
-            scene = self._scene("box", count)
-            with self._stage(scene) as stage:
-                for label, technique in self._techniques(scene):
-                    self._tell(f"{count} lights, {label}")
-                    row = {"lights": count, **self._row(stage, technique), "technique": label}
-                    rows.setdefault(label, []).append(row)
-        return {
-            name: {
-                "rows": measured,
-                "time_fit": line([r["lights"] for r in measured], [r["gpu_ms"]["median"] for r in measured]),
-                "memory_fit": line([r["lights"] for r in measured], [_both(r) for r in measured]),
+def _document(s: Settings, planned: Plan, rows: Rows) -> dict[str, Any]:
+    """The figures by part. What could not be measured is missing from its part, and listed under ``failed``."""
+    done = {id: row for id, row in rows.items() if row["status"] == "done"}
+    failed = [row for row in rows.values() if row["status"] != "done"]
+    if not done:
+        raise GpuError(f"nothing could be measured: {failed[0]['reason']}")
+    found = {
+        name: [done[p.id] for p in points if p.id in done]
+        for name, points in zip(_parts(s), planned.parts, strict=True)
+    }
+    last = max(done.values(), key=lambda row: str(row["date"]))
+    document = {
+        "benchmark": NAME,
+        "date": last["date"].partition("T")[0],
+        "adapter": last["adapter"],
+        "adapter_type": last["adapter_type"],
+        "driver": last["driver"],
+        "versions": last["versions"],
+        "settings": {
+            "size": list(s.size),
+            "shadow_size": s.shadow_size,
+            "grid": list(s.grid),
+            "samples": s.samples,
+            "frames": s.frames,
+            "warmup": s.warmup,
+        },
+        "scenes": [
+            {
+                "scene": row["point"]["scene"],
+                "triangles": row["triangles"],
+                "scene_hash": row["scene_hash"],
+                "intensity": _intensity(row["point"]["scene"]),
+                **_figures(row),
             }
-            for name, measured in rows.items()
-        }
-
-    def resolution(self) -> dict[str, Any]:
-        """Error, time and memory against each technique's own resolution."""
-        return {name: self._resolution(self._scene(name)) for name in self.settings.error_scenes}
-
-    def _resolution(self, scene: Scene) -> dict[str, Any]:
-        s = self.settings
-        with self._stage(scene) as stage:
-            self._tell(f"{scene.name}, reference")
-            truth = self._reference(stage)
-            sweeps: dict[str, list[dict[str, Any]]] = {
-                "froxel": self._sweep(stage, "froxel", "grid", s.grids, truth),
-                "screen_space": self._sweep(stage, "screen_space", "samples", s.sample_counts, truth),
-                "march": self._sweep(stage, "march", "steps", s.step_counts, truth),
-            }
-        # The polygonal mesh has one vertex a texel, so its resolution is the map's. Its own error is against a march on
-        # the same map; the map's error comes on top, and shows against a march on the finest map.
-        finest = None
-        sweeps["polygonal"] = []
-        for size in sorted(s.shadow_sizes, reverse=True):
-            with self._stage(scene, shadow_size=size) as stage:
-                self._tell(f"{scene.name}, reference on a shadow map of {size}²")
-                same = self._reference(stage)
-                finest = finest or same
-                (row,) = self._sweep(stage, "polygonal", None, [size], same)
-                still = stage.still(self._technique("polygonal", scene))
-                row |= {"against_finest": _errors(still.light, finest.still.light)}
-                sweeps["polygonal"].insert(0, row)
-        return {
-            "scene_hash": scene_hash(scene),
-            "reference": truth.to_json(),
-            "sweeps": sweeps,
-        }
-
-    def _sweep(
-        self, stage: Stage, name: str, parameter: str | None, values: Iterable[Any], truth: Reference
-    ) -> list[dict[str, Any]]:
-        rows = []
-        for value in values:
-            self._tell(f"{stage.scene.name}, {name} at {_value(value)}")
-            technique = self._technique(name, stage.scene)
-            if parameter is not None:
-                technique = replace(technique, {parameter: value})
-            row = self._row(stage, technique)
-            light = stage.still(technique).light
-            rows.append({"resolution": value, **row, "error": _errors(light, truth.still.light)})
-        return rows
-
-    def _row(self, stage: Stage, technique: Technique) -> dict[str, Any]:
-        s = self.settings
-        measured = measure(stage.use(technique), frames=s.frames, warmup=s.warmup, budget_s=s.seconds)
-        return {"technique": technique.name, "parameters": describe(technique), **_figures(measured)}
-
-    def _reference(self, stage: Stage) -> Reference:
-        return find(stage, budget_s=4 * self.settings.seconds)
-
-    def _technique(self, name: str, scene: Scene) -> Technique:
-        return make("volumetric", name, scene, self.settings.parameters())
-
-    def _techniques(self, scene: Scene) -> list[tuple[str, Technique]]:
-        made = []
-        for label in TECHNIQUES:
-            name, _, choice = label.partition("/")
-            made.append((label, replace(self._technique(name, scene), _CHOICES.get(choice, {}))))
-        return made
-
-    def _scene(self, name: str, lights: int = 1) -> Scene:
-        key = (name, lights)
-        if key not in self._made:
-            self._say(f"building {name}")
-            self._made[key] = bundled.SCENES[name](lights=lights)
-        return self._made[key]
-
-    def _stage(self, scene: Scene, shadow_size: int | None = None) -> Stage:
-        s = self.settings
-        parameters = {"shadow_map": {"size": shadow_size or s.shadow_size}}
-        return Stage(scene, s.size, shadow="shadow_map", parameters=parameters, adapter=self.gpu)
-
-    def _tell(self, text: str) -> None:
-        self._say(text)
-        self._done += 1
-
-    def _say(self, text: str) -> None:
-        if self._progress:
-            self._progress(min(1.0, self._done / self._total), text)
+            for row in found.get("scenes", ())
+        ],
+        "lights": _lights(found.get("lights", ())),
+        "resolution": {name: _resolution(name, found) for name in s.error_scenes},
+        "truth": {name: _truth(name, s, found) for name in s.truth_scenes},
+    }
+    if failed:
+        names = {point.id: str(point) for point in planned.points}
+        document["failed"] = [{"point": names[row["id"]], "reason": row["reason"]} for row in failed]
+    return document
 
 
-def _figures(measured: Measurement) -> dict[str, Any]:
-    technique, shadow, frame = measured.technique("volumetric"), measured.technique("shadow"), measured.frame
-    if technique is None or shadow is None or frame is None:
-        raise GpuError("this adapter cannot time what it draws (timestamp-query), and a benchmark is of times")
+def _figures(row: Mapping[str, Any]) -> dict[str, Any]:
+    kept = ("gpu_ms", "frame_ms", "shadow_ms", "host_ms", "passes", "memory_bytes", "shadow_bytes", "memory", "frames")
+    technique = row["point"]["technique"]
     return {
-        "gpu_ms": technique.to_json(),
-        "frame_ms": frame.to_json(),
-        "shadow_ms": shadow.to_json(),
-        "host_ms": measured.host.to_json(),
-        "passes": {name: round(times.median, 6) for name, times in measured.passes.items()},
-        "memory_bytes": measured.bytes_of("volumetric"),
-        "shadow_bytes": measured.bytes_of("shadow"),
-        "memory": dict(measured.memory),
-        "frames": measured.frames,
+        "technique": _label(technique),
+        "parameters": technique,
+        **{name: row[name] for name in kept if name in row},
     }
 
 
-def _errors(light: NDArray[np.float32], truth: NDArray[np.float32]) -> dict[str, float | None]:
-    return {"rel_rmse": metrics.rel_rmse(light, truth), "bias": metrics.bias(light, truth)}
+def _label(technique: Mapping[str, Any]) -> str:
+    """As in :data:`TECHNIQUES`."""
+    choices = [name for name, values in _CHOICES.items() if all(technique.get(k) == v for k, v in values.items())]
+    return "/".join([technique["technique"], *choices])
 
 
-def _both(row: Mapping[str, Any]) -> float:
-    """Bytes of a technique with the shadow maps that it reads."""
-    return float(row["memory_bytes"] + row["shadow_bytes"])
+def _intensity(scene: str) -> float:
+    light = bundled.SCENES[scene]().lights[0]
+    return float(light.intensity)
 
 
-def _value(value: Any) -> str:
-    return "×".join(map(str, value)) if isinstance(value, (tuple, list)) else str(value)
+def _lights(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """By technique, and the lines through its time and memory."""
+    by_technique: dict[str, list[dict[str, Any]]] = {}
+    for row in rows:
+        figures = {"lights": row["point"]["lights"], **_figures(row)}
+        by_technique.setdefault(figures["technique"], []).append(figures)
+    return {
+        name: {
+            "rows": measured,
+            "time_fit": line([r["lights"] for r in measured], [r["gpu_ms"]["median"] for r in measured]),
+            "memory_fit": line(
+                [r["lights"] for r in measured], [r["memory_bytes"] + r["shadow_bytes"] for r in measured]
+            ),
+        }
+        for name, measured in by_technique.items()
+        if len(measured) > 1
+    }
+
+
+def _resolution(scene: str, found: Mapping[str, Sequence[Mapping[str, Any]]]) -> dict[str, Any]:
+    """Error, time and memory against each technique's own resolution."""
+    parameters = {"froxel": "grid", "screen_space": "samples", "march": "steps"}
+    sweeps: dict[str, list[dict[str, Any]]] = {}
+    rows: list[Mapping[str, Any]] = []
+    for name, parameter in parameters.items():
+        own = [row for row in found[name] if row["point"]["scene"] == scene]
+        rows += own
+        sweeps[name] = [
+            {"resolution": row["point"]["technique"][parameter], **_figures(row), "error": row["errors"]["inscattered"]}
+            for row in own
+        ]
+    finest = {
+        row["point"]["shadow"]["size"]: row["errors"]["inscattered"]
+        for row in found["finest"]
+        if row["point"]["scene"] == scene
+    }
+    sweeps["polygonal"] = [
+        {
+            "resolution": (size := row["point"]["shadow"]["size"]),
+            **_figures(row),
+            "error": row["errors"]["inscattered"],
+            "against_finest": finest.get(size),
+        }
+        for row in found["polygonal"]
+        if row["point"]["scene"] == scene
+    ]
+    return {
+        "scene_hash": rows[0]["scene_hash"] if rows else None,
+        "reference": rows[0]["truth"] if rows else None,
+        "sweeps": sweeps,
+    }
+
+
+def _truth(scene: str, s: Settings, found: Mapping[str, Sequence[Mapping[str, Any]]]) -> dict[str, Any]:
+    """Errors against a traced truth, of the techniques and of a march that has converged."""
+    rows = [row for part in ("truth", "converged") for row in found[part] if row["point"]["scene"] == scene]
+    return {
+        "size": list(s.truth_size),
+        "truth": rows[0]["truth"] if rows else None,
+        "rows": [
+            {
+                "technique": _label(row["point"]["technique"]),
+                "parameters": row["point"]["technique"],
+                "shadow": row["point"]["shadow"],
+                "errors": row["errors"],
+            }
+            for row in rows
+        ],
+    }
 
 
 def _write(path: Path, text: str) -> None:

@@ -1,8 +1,9 @@
-"""The benchmark's figures as Markdown tables, with S1's own figures beside them.
+"""The benchmark's figures as Markdown tables and as plots, with S1's own numbers beside them.
 
-S1 published frames per second with and without each technique on an RTX 4060 Laptop; the time of a technique is then
-``1000/fps − 1000/fps_off``. That is another machine and another base image: its column shows the order of magnitude and
-the trend, not a race.
+S1 (:mod:`tyndall.lab.s1`) published frames per second with and without each technique on an RTX 4060 Laptop; the time
+of a technique is then ``1000/fps − 1000/fps_off``. That is another machine and another base image: its columns show
+the order of magnitude and the trend, not a race. Every table and plot is made from a result alone; what a result does
+not hold is not shown.
 """
 
 from __future__ import annotations
@@ -10,35 +11,77 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
-# S1, table 6: frames per second on an RTX 4060 Laptop, by this project's scene of the same character.
-S1_FPS = {
-    "box": {"off": 156, "froxel": 136, "screen_space": 119, "polygonal": 116},
-    "blinds": {"off": 103, "froxel": 94, "screen_space": 83, "polygonal": 68},
-    "courtyard": {"off": 46, "froxel": 44, "screen_space": 43, "polygonal": 34},
+from tyndall.lab import s1
+from tyndall.lab.plots import Dots, Lines
+
+_OTHER = f"another machine, {s1.MACHINE}"
+_PLOTS = {
+    "time": "Figure 20: time of each technique in each scene, S1's beside ours",
+    "lights": "Figure 21: time of each technique against the number of lights",
+    "memory": "Figure 22: memory of each technique against the number of lights",
 }
-S1_MACHINE = "RTX 4060 Laptop"
 
 
-def s1_milliseconds(scene: str, technique: str) -> float | None:
-    """What S1's technique added to its frame, in ms; None where it has no such figure."""
-    fps = S1_FPS.get(scene, {})
-    if technique == "off" or technique not in fps:
-        return None
-    return 1000 / fps[technique] - 1000 / fps["off"]
+def markdown(document: Mapping[str, Any], images: str | None = None) -> str:
+    """All tables of a benchmark's document, or of as many parts as it has.
 
-
-def markdown(document: Mapping[str, Any]) -> str:
-    """All tables of a benchmark's document, or of as many parts as it has yet."""
+    Args:
+        images: how the names of the plots' files begin, folder included (``images/h200-``); None shows no plots.
+    """
     parts = [_head(document)]
-    if "scenes" in document:
-        if document["adapter_type"] != "CPU" and document["settings"]["size"] == [2134, 1459]:
+    if document.get("scenes"):
+        if document["adapter_type"] != "CPU" and document["settings"]["size"] == list(s1.TECHNICAL["picture"]):
             parts.append(_goals(document))
-        parts += [_scenes(document), _memory(document)]
-    if "lights" in document:
+        parts += [_study(document, images), _scenes(document), _memory(document)]
+    if document.get("lights"):
         parts.append(_lights(document))
-    if "resolution" in document:
-        parts += [_resolution(name, found) for name, found in document["resolution"].items()]
+    parts += [_resolution(name, found) for name, found in document.get("resolution", {}).items() if found["reference"]]
+    if judged := {name: found for name, found in document.get("truth", {}).items() if found["rows"]}:
+        parts.append(_truth(judged, document["settings"]["shadow_size"]))
+    if document.get("failed"):
+        rows = [[row["point"], row["reason"]] for row in document["failed"]]
+        parts.append(f"### Not measured\n\n{_table(['point', 'reason'], rows)}")
     return "\n\n".join(parts) + "\n"
+
+
+def plots(document: Mapping[str, Any]) -> dict[str, str]:
+    """S1's figures 20 to 22 from a benchmark's document, as SVG files by name; of as many as it has the parts."""
+    found = {}
+    machine = str(document["adapter"])
+    if document.get("scenes"):
+        groups: dict[str, list[tuple[str, tuple[float, float | None]]]] = {}
+        for row in document["scenes"]:
+            if row["technique"] != "off":
+                ms = (row["gpu_ms"]["median"], s1.milliseconds(row["scene"], row["technique"]))
+                groups.setdefault(row["scene"], []).append((row["technique"], ms))
+        found["time"] = Dots(
+            title="Time of each technique, one light",
+            description=f"GPU milliseconds on {machine}, beside those that follow from S1's frame rates: {_OTHER}.",
+            unit="ms",
+            kinds=(machine, f"S1: {_OTHER}"),
+            groups=list(groups.items()),
+        ).svg()
+    if document.get("lights"):
+        measured = document["lights"]
+        counts = [row["lights"] for row in next(iter(measured.values()))["rows"]]
+        complete = {n: t["rows"] for n, t in measured.items() if [row["lights"] for row in t["rows"]] == counts}
+        found["lights"] = Lines(
+            title=f"Time against the number of lights, {machine}",
+            description="GPU milliseconds of each technique in box; both axes are logarithmic.",
+            across="lights",
+            unit="ms",
+            places=counts,
+            series={n: [row["gpu_ms"]["median"] for row in rows] for n, rows in complete.items() if n != "off"},
+        ).svg()
+        found["memory"] = Lines(
+            title=f"Memory against the number of lights, {machine}",
+            description="MiB of each technique with the shadow maps that it reads, in box.",
+            across="lights",
+            unit="MiB",
+            places=counts,
+            series={n: [_both(row) / 2**20 for row in rows] for n, rows in complete.items() if n != "off"},
+        ).svg()
+    return found
 
 
 def comparison(document: Mapping[str, Any]) -> str:
@@ -83,6 +126,147 @@ def splice(page: str, name: str, text: str) -> str:
     return f"{before}{begin}\n\n{text.strip()}\n\n{end}{after}"
 
 
+def _study(document: Mapping[str, Any], images: str | None) -> str:
+    """S1's tables 1 to 6 and figures 20 to 22, made anew, with its own numbers."""
+    text = (
+        f"Columns that begin with *S1* hold what S1 printed, measured on {_OTHER}. Its scenes *Bunny Box*, *Classroom* "
+        "and *San Miguel* stand beside `box`, `blinds` and `courtyard`, which have their character and their numbers "
+        "of triangles. The parameters are those of the techniques' `paper` models, with which its pictures are "
+        "repeated; times are those of the `physical` models."
+    )
+    return "\n\n".join(
+        [
+            "### S1's tables and figures",
+            text,
+            _study_scenes(document),
+            _study_settings(document),
+            _study_parameters(document),
+            _study_rates(document),
+            *([_study_figures(document, images)] if images is not None else []),
+        ]
+    )
+
+
+def _study_scenes(document: Mapping[str, Any]) -> str:
+    found = {row["scene"]: row["triangles"] for row in document["scenes"]}
+    rows = [[name, f"{count:,}", *_named(s1.SCENES.get(name))] for name, count in found.items()]
+    return f"**Table 1**, scenes.\n\n{_table(['scene', 'triangles', 'S1: scene', 'S1: triangles'], rows)}"
+
+
+def _named(scene: tuple[str, int] | None) -> list[str]:
+    return [scene[0], f"{scene[1]:,}"] if scene else ["–", "–"]
+
+
+def _study_settings(document: Mapping[str, Any]) -> str:
+    s = document["settings"]
+    map_size = s["shadow_size"]
+    ours = [s["size"], [map_size, map_size], s["grid"], [s["samples"]]]
+    rows = [
+        [name, _times(own), _times(list(theirs))]
+        for own, (name, theirs) in zip(ours, s1.TECHNICAL.items(), strict=True)
+    ]
+    return f"**Table 2**, sizes.\n\n{_table(['what', 'here', 'S1'], rows)}"
+
+
+def _study_parameters(document: Mapping[str, Any]) -> str:
+    names = [name for name in s1.SCENES if any(row["scene"] == name for row in document["scenes"])]
+    rows = []
+    for technique, parameters in s1.VISUAL.items():
+        found = {r["scene"]: r for r in document["scenes"] if r["technique"] == technique}
+        for parameter, theirs in parameters.items():
+            cells = [technique, "light, L_c" if parameter == "light" else parameter]
+            for name in names:
+                row = found.get(name, {})
+                own = row.get("intensity") if parameter == "light" else row.get("parameters", {}).get(parameter)
+                cells += [_plain(own), _plain(theirs[list(s1.SCENES).index(name)])]
+            rows.append(cells)
+    heading = ["technique", "parameter", *(cell for name in names for cell in (name, f"S1: {s1.SCENES[name][0]}"))]
+    return f"**Tables 3, 4 and 5**, what each technique's look is set to.\n\n{_table(heading, rows)}"
+
+
+def _study_rates(document: Mapping[str, Any]) -> str:
+    columns = ("off", "froxel", "screen_space", "polygonal")
+    rows = []
+    for name in dict.fromkeys(row["scene"] for row in document["scenes"]):
+        own = {row["technique"]: row for row in document["scenes"] if row["scene"] == name}
+        ours = [_rate(own[c]["frame_ms"]["median"]) if c in own else "–" for c in columns]
+        rows.append([name, *ours, *(str(s1.FPS.get(name, {}).get(c, "–")) for c in columns)])
+    text = (
+        "**Table 6**, frames per second with one light: 1000 over the GPU time of a frame here; as shown there, by "
+        f"{_OTHER}, whose base image traces its shadows."
+    )
+    return f"{text}\n\n{_table(['scene', *columns, *(f'S1: {c}' for c in columns)], rows)}"
+
+
+def _study_figures(document: Mapping[str, Any], images: str) -> str:
+    made = plots(document)
+    links = [f"![{text}]({images}{name}.svg)" for name, text in _PLOTS.items() if name in made]
+    text = (
+        "**Figures 20, 21 and 22**, made anew. S1 prints no numbers in its plots: those of its figure 20 are what its "
+        "table 6 gives; of figures 21 and 22 it says that time and memory grow linearly with the lights for every "
+        f"method (the slopes and R² are below). {_held()}"
+    )
+    return "\n\n".join([text, *links])
+
+
+def _truth(judged: Mapping[str, Mapping[str, Any]], shadow_size: int) -> str:
+    """Errors against a traced truth: one table over the scenes, and one a scene with every metric."""
+    first = next(iter(judged.values()))
+    width, height = first["size"]
+    text = (
+        f"Stills of {width}×{height} against the path-traced truth, in which rays and not a shadow map say what the "
+        "light reaches. *rel. RMSE* and *bias* are of `L_v` as everywhere on this page, with the truth's own noise "
+        "taken off. *At best scale* is the error that is left after the one factor that fits best, *scale*: it tells "
+        "the shape of the light apart from its strength, of use for screen space, which is right up to a factor at "
+        f"most. FLIP and SSIM are of the whole linear picture. Shadow maps have {shadow_size}² texels where no other "
+        "size is given; rows of a march that has converged show the error of their shadow map alone."
+    )
+    labels = [[_truth_label(row, shadow_size) for row in found["rows"]] for found in judged.values()]
+    by_scene = [
+        {label: row["errors"]["inscattered"] for label, row in zip(names, found["rows"], strict=True)}
+        for names, found in zip(labels, judged.values(), strict=True)
+    ]
+    rows = [
+        [label, *(_percent(own.get(label, {}).get("rel_rmse_corrected")) for own in by_scene)]
+        for label in dict.fromkeys(label for names in labels for label in names)
+    ]
+    parts = ["### Error against truth", text, _table(["rel. RMSE of `L_v`", *judged], rows)]
+    heading = ["technique", "rel. RMSE", "bias", "at best scale", "scale", "picture: rel. RMSE", "FLIP", "SSIM"]
+    for names, (scene, found) in zip(labels, judged.items(), strict=True):
+        how = found["truth"]
+        rows = []
+        for label, row in zip(names, found["rows"], strict=True):
+            light, picture = row["errors"]["inscattered"], row["errors"]["radiance"]
+            scaled = light["best_scale"] if light["best_scale"] else None
+            rows.append(
+                [
+                    label,
+                    _percent(light["rel_rmse_corrected"]),
+                    _percent(light["bias"], "+"),
+                    _percent(light["scaled_rel_rmse"] if scaled else None),
+                    _decimal(scaled),
+                    _percent(picture["rel_rmse_corrected"]),
+                    _decimal(picture["flip"]),
+                    _decimal(picture["ssim"]),
+                ]
+            )
+        noise = _percent(how["relative_error"]["inscattered"])
+        parts.append(
+            f"**{scene}**: truth of {how['samples']:,} samples a pixel, traced in {how['seconds']:.1f} s; its own "
+            f"relative standard error is {noise} of `L_v`, {_percent(how['relative_error']['radiance'])} of the "
+            "picture.\n\n" + _table(heading, rows)
+        )
+    return "\n\n".join(parts)
+
+
+def _truth_label(row: Mapping[str, Any], shadow_size: int) -> str:
+    label = str(row["technique"])
+    if label == "march":
+        label += f", {row['parameters']['steps']} steps"
+    size = row["shadow"].get("size")
+    return label if size in (None, shadow_size) else f"{label}, map of {size}²"
+
+
 def _goals(document: Mapping[str, Any]) -> str:
     """The project's own goals at S1's settings, each against the worst of what was measured."""
     scenes = document["scenes"]
@@ -103,7 +287,7 @@ def _goals(document: Mapping[str, Any]) -> str:
         ("froxel, memory", worst("froxel", size) / 2**20, 36.0, "MiB"),
         (
             "polygonal, memory with its shadow map",
-            worst("polygonal", lambda row: float(row["memory_bytes"] + row["shadow_bytes"])) / 2**20,
+            worst("polygonal", _both) / 2**20,
             8.0,
             "MiB",
         ),
@@ -135,8 +319,8 @@ def _head(document: Mapping[str, Any]) -> str:
 def _scenes(document: Mapping[str, Any]) -> str:
     rows = []
     for row in document["scenes"]:
-        s1 = s1_milliseconds(row["scene"], row["technique"])
-        fps = S1_FPS.get(row["scene"], {}).get(row["technique"])
+        theirs = s1.milliseconds(row["scene"], row["technique"])
+        fps = s1.FPS.get(row["scene"], {}).get(row["technique"])
         gpu = row["gpu_ms"]
         rows.append(
             [
@@ -144,14 +328,14 @@ def _scenes(document: Mapping[str, Any]) -> str:
                 row["technique"],
                 *(_ms(gpu[key]) for key in ("median", "min", "p95")),
                 _ms(row["frame_ms"]["median"]),
-                f"{1000 / row['frame_ms']['median']:.0f}" if row["frame_ms"]["median"] else "–",
+                _rate(row["frame_ms"]["median"]),
                 _ms(row["host_ms"]["median"]),
-                f"{s1:.2f}" if s1 is not None else "–",
+                f"{theirs:.2f}" if theirs is not None else "–",
                 str(fps) if fps is not None else "–",
             ]
         )
     heading = ["scene (triangles)", "technique", "GPU ms", "min", "p95", "frame ms", "frames/s", "host ms"]
-    heading += [f"S1: ms, {S1_MACHINE}", "S1: frames/s"]
+    heading += [f"S1: ms, {s1.MACHINE}", "S1: frames/s"]
     text = (
         "GPU ms is the technique's passes alone; frame ms is the GPU time of the whole frame; host ms is the time to "
         "encode and submit it. S1's columns come from another machine and another base image."
@@ -179,7 +363,7 @@ def _memory(document: Mapping[str, Any]) -> str:
         for row in document["scenes"]
         if row["scene"] == first
     ]
-    text = "S1's engine held 66.8 MiB for its froxels and 36 MiB a light for its polygonal mesh and shadow map."
+    text = _held()
     table = _table(["technique", "technique's own MiB", "shadow map MiB"], rows)
     return f"### Memory, one directional light\n\n{text}\n\n{table}"
 
@@ -191,7 +375,7 @@ def _lights(document: Mapping[str, Any]) -> str:
     for name, technique in found.items():
         rows, time, memory = technique["rows"], technique["time_fit"], technique["memory_fit"]
         time_rows.append([name, *(_ms(r["gpu_ms"]["median"]) for r in rows), _ms(time["slope"]), f"{time['r2']:.4f}"])
-        totals = (_mib(r["memory_bytes"] + r["shadow_bytes"]) for r in rows)
+        totals = (_mib(_both(r)) for r in rows)
         memory_rows.append([name, *totals, _mib(memory["slope"]), f"{memory['r2']:.4f}"])
     heads = [str(count) for count in counts]
     return "\n\n".join(
@@ -236,6 +420,28 @@ def _table(heading: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     """A Markdown table; all columns but the first two are numbers."""
     rule = ["---" if i == 0 else "---:" for i in range(len(heading))]
     return "\n".join("| " + " | ".join(cells) + " |" for cells in (heading, rule, *rows))
+
+
+def _held() -> str:
+    froxel, polygonal = (f"{s1.MEMORY[name]:g} MiB" for name in ("froxel", "polygonal"))
+    return f"S1's engine held {froxel} for its froxels and {polygonal} a light for its polygonal mesh and shadow map."
+
+
+def _both(row: Mapping[str, Any]) -> float:
+    """Bytes of a technique with the shadow maps that it reads."""
+    return float(row["memory_bytes"] + row["shadow_bytes"])
+
+
+def _rate(ms: float) -> str:
+    return f"{1000 / ms:.0f}" if ms else "–"
+
+
+def _plain(value: float | None) -> str:
+    return "–" if value is None else f"{value:g}"
+
+
+def _decimal(value: float | None) -> str:
+    return "–" if value is None else f"{value:.3f}"
 
 
 def _ms(ms: float) -> str:

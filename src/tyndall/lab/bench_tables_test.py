@@ -6,7 +6,8 @@ from typing import Any
 
 import pytest
 
-from tyndall.lab import bench_tables
+from tyndall.lab import bench_tables, s1
+from tyndall.scene import bundled
 
 
 def row(technique: str, scene: str, median: float) -> dict[str, Any]:
@@ -68,15 +69,24 @@ def document() -> dict[str, Any]:
 
 
 def test_s1_milliseconds_follow_from_its_frame_rates() -> None:
-    assert bench_tables.s1_milliseconds("box", "froxel") == pytest.approx(0.943, abs=1e-3)
-    assert bench_tables.s1_milliseconds("courtyard", "polygonal") == pytest.approx(7.673, abs=1e-3)
-    assert bench_tables.s1_milliseconds("box", "off") is None
-    assert bench_tables.s1_milliseconds("box", "march") is None
+    assert s1.milliseconds("box", "froxel") == pytest.approx(0.943, abs=1e-3)
+    assert s1.milliseconds("courtyard", "polygonal") == pytest.approx(7.673, abs=1e-3)
+    assert s1.milliseconds("box", "off") is None
+    assert s1.milliseconds("box", "march") is None
+
+
+def test_the_bundled_scenes_are_those_of_s1() -> None:
+    assert {name: triangles for name, (_, triangles) in s1.SCENES.items()} == bundled.TRIANGLES
+    for at, name in enumerate(s1.SCENES):
+        scene = bundled.SCENES[name]()
+        for technique, parameters in s1.VISUAL.items():
+            own = {"light": scene.lights[0].intensity, **scene.looks[technique]}
+            assert {p: values[at] for p, values in parameters.items()} == pytest.approx(own)
 
 
 def test_every_table_is_rectangular(document: dict[str, Any]) -> None:
     blocks = [block for block in bench_tables.markdown(document).split("\n\n") if block.startswith("|")]
-    assert len(blocks) == 6
+    assert len(blocks) == 10
     for block in blocks:
         assert len({line.count("|") for line in block.splitlines()}) == 1
         assert len(block.splitlines()) >= 3
@@ -89,6 +99,60 @@ def test_tables_hold_the_figures(document: dict[str, Any]) -> None:
     assert "| froxel | 36.00 | 36.00 | 4.00 | 0.9987 |" in text
     assert "| polygonal | 512 | 1.500 | 32.00 | 2.00 % | -1.00 % | 5.00 % |" in text
     assert "Slowest scene over fastest: froxel 1.25." in text
+
+
+def test_s1_s_numbers_stand_beside_ours(document: dict[str, Any]) -> None:
+    document["scenes"][0] |= {"parameters": {"z_limit": 17.6}, "intensity": 10.0}
+    text = bench_tables.markdown(document)
+    assert "| blinds | 607,402 | Classroom | 607,402 |" in text
+    assert "| froxels | 190×90×128 | 190×90×128 |" in text
+    assert "| froxel | z_limit | 17.6 | 17.6 | – | 11 |" in text
+    assert "| froxel | light, L_c | 10 | 10 | – | 50 |" in text
+    assert "| box | 1000 | 714 | 455 | 111 | 156 | 136 | 119 | 116 |" in text
+    assert text.count("another machine, RTX 4060 Laptop") == 2
+    assert "![" not in text
+    assert (
+        "![Figure 22: memory of each technique against the number of lights](a/b-memory.svg)"
+        in bench_tables.markdown(document, "a/b-")
+    )
+
+
+def test_the_plots_hold_the_figures(document: dict[str, Any]) -> None:
+    found = bench_tables.plots(document)
+    assert set(found) == {"time", "lights", "memory"}
+    assert found == bench_tables.plots(document), "equal data, equal bytes"
+    assert "box, froxel, Test GPU: 0.1 ms" in found["time"]
+    assert "box, froxel, S1: another machine, RTX 4060 Laptop: 0.943 ms" in found["time"]
+    assert "froxel: 0.2 ms" in found["lights"]
+    assert "froxel: 36 MiB" in found["memory"]
+    del document["lights"]
+    assert set(bench_tables.plots(document)) == {"time"}
+
+
+def test_errors_against_truth_are_a_table_over_the_scenes_and_one_a_scene(document: dict[str, Any]) -> None:
+    light = {"rel_rmse_corrected": 3.0, "bias": -0.5, "scaled_rel_rmse": 0.25, "best_scale": 4.0}
+    picture = {"rel_rmse_corrected": 0.125, "flip": 0.0625, "ssim": None}
+    errors = {"inscattered": light, "radiance": picture}
+    parameters = {"technique": "march", "steps": 2048}
+    march = {"technique": "march", "parameters": parameters, "shadow": {"size": 4096}, "errors": errors}
+    screen = {"technique": "screen_space", "parameters": {}, "shadow": {"size": 1024}, "errors": errors}
+    truth = {"samples": 4096, "seconds": 7.25, "relative_error": {"inscattered": 0.0099, "radiance": 0.001}}
+    document["truth"] = {
+        "box": {"size": [640, 360], "truth": truth, "rows": [screen, march]},
+        "blinds": {"size": [640, 360], "truth": truth, "rows": [march]},
+        "courtyard": {"size": [640, 360], "truth": None, "rows": []},
+    }
+    text = bench_tables.markdown(document)
+    assert "| rel. RMSE of `L_v` | box | blinds |" in text
+    assert "| screen_space | 300.00 % | – |" in text
+    assert "| march, 2048 steps, map of 4096² | 300.00 % | 300.00 % |" in text
+    assert "| screen_space | 300.00 % | -50.00 % | 25.00 % | 4.000 | 12.50 % | 0.062 | – |" in text
+    assert "**box**: truth of 4,096 samples a pixel, traced in 7.2 s; its own relative standard error is 0.99 %" in text
+
+
+def test_what_could_not_be_measured_is_told(document: dict[str, Any]) -> None:
+    document["failed"] = [{"point": "box, 32 lights, 2134×1459, march", "reason": "the worker died (signal 9)"}]
+    assert "| box, 32 lights, 2134×1459, march | the worker died (signal 9) |" in bench_tables.markdown(document)
 
 
 def test_goals_are_held_against_the_worst(document: dict[str, Any]) -> None:

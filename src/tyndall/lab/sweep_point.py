@@ -24,7 +24,8 @@ from typing import Any
 from tyndall.gpu.device import Gpu
 from tyndall.gpu.params import ParameterError, replace
 from tyndall.gpu.resources import Closing
-from tyndall.lab import metrics
+from tyndall.lab import metrics, standard
+from tyndall.lab.compare import SOFT_FRAMES, is_soft
 from tyndall.lab.filelock import device_lock
 from tyndall.lab.fingerprint import scene_hash, versions
 from tyndall.lab.measure import belongs, measure
@@ -84,10 +85,9 @@ class Station(Closing):
             stage = self._prepare(scene, point)
             judged = self._judge(stage, point)
             figures = _figures(stage, technique, point)
-            still = stage.still(technique) if judged else None
-        errors = None
-        if judged and still:
-            errors = _errors(still, judged[0], point["metrics"])
+            # Shadows of lights with a size are sampled: a still gathers some frames, as those of a comparison do.
+            still = stage.still(technique, frames=SOFT_FRAMES if is_soft(scene) else 1) if judged else None
+        errors = _errors(still, judged[0], point["metrics"]) if judged and still else None
         return {
             "scene_name": scene.name,
             "triangles": scene.triangle_count,
@@ -118,9 +118,9 @@ class Station(Closing):
             if self._stage is not None:
                 self._stage[1].close()
                 self._stage = None
-            others = {family: technique_of(family, point[family]) for family in OTHERS}
+            others: dict[str, Any] = {family: technique_of(family, point[family]) for family in OTHERS}
             width, height = point["size"]
-            stage = Stage(scene, (width, height), adapter=self.gpu, seed=point["seed"], **others)  # type: ignore[arg-type]
+            stage = Stage(scene, (width, height), adapter=self.gpu, seed=point["seed"], **others)
             self._stage = key, stage
         return self._stage[1]
 
@@ -129,9 +129,9 @@ class Station(Closing):
         asked = point["truth"]
         if asked is None:
             return None
-        key = (id(stage), asked)
+        key = (id(stage), asked, point["metrics"])
         if self._judged is None or self._judged[0] != key:
-            self._judged = (key, *_judged(stage, asked))
+            self._judged = (key, *_judged(stage, asked, point["metrics"]))
         return self._judged[1:]
 
     def _forget(self) -> None:
@@ -146,43 +146,30 @@ class Station(Closing):
             self.gpu.close()
 
 
-def _judged(stage: Stage, asked: Mapping[str, Any]) -> tuple[dict[str, Target], Plain]:
+def _judged(stage: Stage, asked: Mapping[str, Any], figures: str) -> tuple[dict[str, Target], Plain]:
     given = {name: value for name, value in asked.items() if name not in ("judge", "shadow")}
     settings: Any = replace(judge_settings(asked["judge"])(), given)
     if asked["judge"] == "march":
         if "shadow" not in asked:
             return _marched(stage, settings.seconds)
-        kept = {family: getattr(stage, family) for family in OTHERS}
-        kept["shadow"] = technique_of("shadow", asked["shadow"])
+        kept: dict[str, Any] = {**stage.techniques, "shadow": technique_of("shadow", asked["shadow"])}
         with Stage(stage.scene, stage.size, adapter=stage.gpu, seed=stage.seed, **kept) as other:
             return _marched(other, settings.seconds)
-    if asked["judge"] == "traced":
-        from tyndall.lab.truth import trace
-
-        truth = trace(stage.scene, stage.size, settings, gpu=stage.gpu)
-    else:
-        from tyndall.lab.mitsuba import judge
-
-        truth = judge(stage.scene, stage.size, settings)
-    targets = {
-        "inscattered": Target(truth.inscattered, truth.inscattered_error),
-        "radiance": Target(truth.radiance, truth.radiance_error),
+    found = standard.prepare(stage, "volumetric", asked["judge"], settings)
+    targets = dict(found.targets)
+    if figures == "all":
+        targets |= standard.prepare(stage, "shadow", found.truth).targets
+    return targets, {
+        "judge": found.truth.judge,
+        "samples": found.truth.samples,
+        "relative_error": {kind: _rounded(error) for kind, error in found.noise.items()},
+        "seconds": round(found.truth.seconds, 3),
     }
-    how = {
-        "judge": truth.judge,
-        "samples": truth.samples,
-        "relative_error": {
-            "inscattered": _rounded(truth.relative_error("inscattered")),
-            "radiance": _rounded(truth.relative_error("radiance")),
-        },
-        "seconds": round(truth.seconds, 3),
-    }
-    return targets, how
 
 
 def _marched(stage: Stage, seconds: float) -> tuple[dict[str, Target], Plain]:
     found = find(stage, budget_s=seconds)
-    targets = {"inscattered": Target(found.still.light), "radiance": Target(found.still.picture.radiance)}
+    targets = {kind: Target(found.still.of(kind)) for kind in ("inscattered", "radiance")}
     return targets, {"judge": "march", **found.to_json()}
 
 
@@ -228,8 +215,7 @@ def _errors(still: Still, targets: Mapping[str, Target], asked: str) -> Plain:
             "bias": metrics.bias(light, target.light),
         }
         return {"inscattered": {name: _rounded(value) for name, value in figures.items()}}
-    lights = {"inscattered": still.light, "radiance": still.picture.radiance}
-    return {kind: metrics.score(lights[kind], target).to_json() for kind, target in targets.items()}
+    return {kind: metrics.score(still.of(kind), target).to_json() for kind, target in targets.items()}
 
 
 def _rounded(value: float | None) -> float | None:

@@ -34,9 +34,11 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from tyndall.gpu.params import Field, Param, ParameterError, convert, fields_of, nearest, param, replace
+from tyndall.lab import standard
 from tyndall.lab.fingerprint import scene_hash
 from tyndall.lab.scenes import open_scene
 from tyndall.lab.stage import describe, make
+from tyndall.lab.truth import TruthSettings
 from tyndall.scene import bundled
 from tyndall.scene.errors import SceneError
 from tyndall.scene.files.schema import path_text
@@ -88,17 +90,12 @@ class MarchSettings:
     seconds: float = param(90.0, 0.01, 3600, "most that one frame of the judge takes", unit="s")
 
 
-JUDGES = ("traced", "march", "mitsuba", "none")
+JUDGES = (*standard.JUDGES, "none")
 
 
 def judge_settings(judge: str) -> type:
     """The declared settings of a judge."""
-    if judge == "march":
-        return MarchSettings
-    from tyndall.lab import truth
-
-    settings: type = truth.TruthSettings
-    return settings
+    return MarchSettings if judge == "march" else TruthSettings
 
 
 @dataclass(frozen=True)
@@ -135,10 +132,17 @@ class Point:
 
 @dataclass(frozen=True)
 class Plan:
-    """A specification that is right: as it was given, and its points, in order and each once."""
+    """A specification that is right.
+
+    Attributes:
+        spec: as it was given.
+        points: in order, each once.
+        parts: the points of each of its parts, those among them that another part has too; all where it has no parts.
+    """
 
     spec: Plain
     points: tuple[Point, ...]
+    parts: tuple[tuple[Point, ...], ...]
 
 
 def read(source: str | os.PathLike[str] | Mapping[str, Any]) -> Plan:
@@ -198,12 +202,15 @@ def plan(
         lines = [f"{where(loc)}: {m}" if where(loc) else m for loc, ms in wrong.items() for m in dict.fromkeys(ms)]
         raise SweepError(lines)
     points: dict[str, Point] = {}
+    parts = []
     for part in record.products():
+        own: dict[str, Point] = {}
         for point in _expand(part, scenes):
-            points.setdefault(point.id, point)
+            own.setdefault(point.id, points.setdefault(point.id, point))
             if len(points) > _MOST_POINTS:
                 raise SweepError([f"more than {_MOST_POINTS} points; measure them in several sweeps"])
-    return Plan(json.loads(json.dumps(spec)), tuple(points.values()))
+        parts.append(tuple(own.values()))
+    return Plan(json.loads(json.dumps(spec)), tuple(points.values()), tuple(parts))
 
 
 # --- the fields ---------------------------------------------------------------------------------------------------
@@ -434,8 +441,11 @@ def _truth(value: Any) -> Plain | None:
         elif chosen is not None:
             one = {name: values[0] for name, values in chosen.values.items()}
             made["shadow"] = _plain(replace(MEMBERS[chosen.name](), one))
-    made |= wrong.over(partial(_settings, judge_settings(judge)), given) or {}
+    cls = judge_settings(judge)
+    made |= wrong.over(partial(_settings, cls), given) or {}
     wrong.raise_any()
+    if judge != "march":
+        standard.check("volumetric", judge, cls(**{f.name: made[f.name] for f in fields_of(cls)}))
     return made
 
 

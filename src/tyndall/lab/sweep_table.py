@@ -28,7 +28,7 @@ def table(rows: Sequence[Mapping[str, Any]], notes: Sequence[str] = ()) -> Table
     made.show_edge = False
     for name in varied:
         made.add_column(name, no_wrap=True)
-    for heading in ("GPU ms", "p95", "frame ms", "host ms", "MiB", "L_v rel. RMSE", "bias"):
+    for heading in ("GPU ms", "p95", "shadow ms", "frame ms", "host ms", "MiB", "L_v rel. RMSE", "bias"):
         made.add_column(heading, justify="right", no_wrap=True)
     for row, point in zip(rows, points, strict=True):
         own = [_text(point.get(name)) for name in varied]
@@ -57,10 +57,12 @@ def _varied(points: Sequence[Mapping[str, Any]]) -> list[str]:
 
 def _figures(row: Mapping[str, Any]) -> list[str]:
     light = (row["errors"] or {}).get("inscattered", {})
-    gpu, frame, host = row["gpu_ms"] or {}, row["frame_ms"] or {}, row["host_ms"] or {}
+    gpu, shadow, frame, host = (row.get(name) or {} for name in ("gpu_ms", "shadow_ms", "frame_ms", "host_ms"))
     error = light.get("rel_rmse_corrected", light.get("rel_rmse"))
     return [
-        *(_ms(value) for value in (gpu.get("median"), gpu.get("p95"), frame.get("median"), host.get("median"))),
+        _ms(gpu.get("median")),
+        _ms(gpu.get("p95")),
+        *(_ms(times.get("median")) for times in (shadow, frame, host)),
         f"{row['memory_bytes'] / 2**20:.2f}",
         "–" if error is None else f"{100 * error:.2f} %",
         "–" if light.get("bias") is None else f"{100 * light['bias']:+.2f} %",
@@ -69,7 +71,7 @@ def _figures(row: Mapping[str, Any]) -> list[str]:
 
 def _reason(row: Mapping[str, Any]) -> list[str]:
     reason = str(row["reason"])
-    return [row["status"], *5 * ["–"], reason if len(reason) <= _MOST_REASON else f"{reason[:_MOST_REASON]}…"]
+    return [row["status"], *6 * ["–"], reason if len(reason) <= _MOST_REASON else f"{reason[:_MOST_REASON]}…"]
 
 
 def _ms(value: float | None) -> str:
