@@ -230,6 +230,7 @@ def test_bench_writes_its_figures_as_json_and_as_tables(
         ("render box --seed -1", "--seed"),
         ("render box --seed 4294967296", "--seed"),
         ("render box --shadow shadowmap", "did you mean 'shadow_map'?"),
+        ("render box --occlusion ray_traced", "did you mean 'ray_traced_ao'?"),
         ("render box --froxel.gird 1,2,3", "--froxel.gird: 'froxel' has no parameter 'gird' — did you mean 'grid'?"),
         ("render box --froxle.grid 1,2,3", "did you mean 'froxel'?"),
         ("render box --froxel.grid 1,2", "--froxel.grid: '1,2' is not 3 whole numbers"),
