@@ -197,15 +197,56 @@ def test_lights_are_placed_in_a_bundled_scene(capsys: pytest.CaptureFixture[str]
 def test_bench_writes_its_figures_as_json_and_as_tables(
     capsys: pytest.CaptureFixture[str], folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    tiny = dataclasses.replace(
-        bench.QUICK, size=(16, 9), shadow_size=64, grid=(8, 4, 4), lights=(1, 2), error_scenes=(), frames=1, warmup=0
-    )
+    smaller = dataclasses.replace(bench.QUICK, size=(16, 9), shadow_size=64, grid=(8, 4, 4), frames=1, warmup=0)
+    tiny = dataclasses.replace(smaller, lights=(1, 2), error_scenes=(), truth_scenes=())
     monkeypatch.setattr(bench, "QUICK", tiny)
     code, out, err = run(capsys, "bench", "volumetric", "--quick", "--out", "figures")
     assert code == 0, err
     assert "| box (4,968) | froxel |" in out
     kept = json.loads((folder / "figures/volumetric.json").read_text())
     assert {row["technique"] for row in kept["scenes"]} >= {"off", "froxel", "march"}
+    _, out, err = run(capsys, "bench", "volumetric", "--quick", "--out", "figures", "--json")
+    assert json.loads(out) == kept
+    assert "12 of 12 points were measured before" in err
+
+
+def test_sweep_measures_what_flags_say_and_goes_on(capsys: pytest.CaptureFixture[str], folder: Path) -> None:
+    words = ("sweep", "--scenes", "box", "--techniques", "off,froxel", "--sizes", "16x9", "--frames", "1")
+    more = (*words, "--froxel.grid", "8x4x4,16x9x8", "--workers", "0", "--format", "csv", "--out", "kept")
+    document = run_json(capsys, *more)
+    assert [row["point"]["technique"].get("grid") for row in document["rows"]] == [None, [8, 4, 4], [16, 9, 8]]
+    assert {path.name for path in (folder / "kept").iterdir()} == {"results.jsonl", "results.csv", "spec.json"}
+    code, out, _ = run(capsys, *more)
+    assert code == 0
+    assert "3 of 3 points were measured before" in out
+    assert run_json(capsys, "sweep", "kept/spec.json", "--out", "kept")["reused"] == 3
+
+
+def test_a_sweep_with_mistakes_is_refused_whole(capsys: pytest.CaptureFixture[str], folder: Path) -> None:
+    flags = (
+        "--scenes boxs --techniques froxl --sizes 16 --lights 0 --march.stepz 3 --truth.tagret 1 --frames x --seed -1"
+    )
+    code, out, err = run(capsys, "sweep", *flags.split(), "--froxel.grid", "1x2")
+    assert (code, out) == (2, "")
+    for said in (
+        "--scenes: no scene 'boxs'",
+        "--techniques: no volumetric technique 'froxl' — did you mean 'froxel'?",
+        "--sizes: '16'",
+        "--march.stepz: 'march' has no parameter 'stepz' — did you mean 'steps'?",
+        "--froxel.grid: '1x2' is not 3 whole numbers",
+        "--truth.tagret: no such setting — did you mean 'target'?",
+        "--frames: 'x' is not a whole number",
+        "--seed: -1 is outside",
+    ):
+        assert sum(line.startswith(f"tyndall: {said}") for line in err.splitlines()) == 1, (said, err)
+    assert list(folder.iterdir()) == []
+
+
+def test_a_specification_in_a_file_is_not_mixed_with_flags(capsys: pytest.CaptureFixture[str], folder: Path) -> None:
+    (folder / "spec.json").write_text('{"scenes": "box"}')
+    for flag in ("--scenes", "--march.steps"):
+        code, _, err = run(capsys, "sweep", "spec.json", flag, "3")
+        assert (code, err) == (2, f"tyndall: {flag}: spec.json says what is measured; write it there\n")
 
 
 # --- mistakes -----------------------------------------------------------------------------------------------------

@@ -294,17 +294,23 @@ def doctor(adapter: AdapterName = None, as_json: Json = False) -> None:
 def volumetric(
     *,
     quick: Annotated[bool, typer.Option("--quick", help="The same in small, for a software adapter.")] = False,
+    fresh: Annotated[bool, typer.Option("--fresh", help="Measure again what the folder already has.")] = False,
     adapter: AdapterName = None,
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for volumetric.json and volumetric.md.")] = (
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the rows, the tables and the plots.")] = (
         Path("out/bench")
     ),
     as_json: Json = False,
 ) -> None:
-    """Time, memory and error of the volumetric techniques against scenes, lights and resolution."""
+    """Time, memory and error of the volumetric techniques against scenes, lights and resolution.
+
+    A sweep: stopped and started again, it goes on where it was.
+    """
     from tyndall.lab import bench as figures
 
-    with console.Work("loading") as work:
-        result = figures.volumetric(adapter, out, quick=quick, progress=work.advance)
+    with console.Work("reading", remaining=True) as work:
+        result = figures.volumetric(adapter, out, quick=quick, fresh=fresh, progress=work.advance)
+        for line in result.notes:
+            work.note(line)
     if as_json:
         print(json.dumps(result.to_json(), indent=2))
     else:

@@ -109,9 +109,14 @@ QUICK = Settings(
 
 @dataclass(frozen=True)
 class Bench:
-    """The figures of one run, as plain data (:meth:`to_json`), tables (:meth:`markdown`) and plots (:meth:`plots`)."""
+    """The figures of one run, as plain data (:meth:`to_json`), tables (:meth:`markdown`) and plots (:meth:`plots`).
+
+    Attributes:
+        notes: what a reader should know of how they came about, a line each.
+    """
 
     document: Mapping[str, Any]
+    notes: tuple[str, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """Ready for ``json.dumps``."""
@@ -180,7 +185,7 @@ def volumetric(
     with tempfile.TemporaryDirectory(prefix="tyndall-") as scratch:
         workers = 0 if isinstance(adapter, Gpu) else 1
         found = sweep(planned, out or scratch, workers=workers, adapter=adapter, fresh=fresh, progress=progress)
-    bench = Bench(_document(chosen, planned, {row["id"]: row for row in found.rows}))
+    bench = Bench(_document(chosen, planned, {row["id"]: row for row in found.rows}), found.notes)
     if out is not None:
         bench.save(out)
     return bench
