@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import os
+import shlex
 import signal
 import subprocess
 import sys
@@ -146,7 +147,8 @@ def test_compare_prints_the_documented_json_and_fills_a_folder(
     capsys: pytest.CaptureFixture[str], folder: Path
 ) -> None:
     words = ("compare", "box", "--technique", "off,froxel", "--size", "48x27", "--frames", "1", "--warmup", "0")
-    document = run_json(capsys, *words, "--froxel.grid", "16,9,8", "--out", "result")
+    words += ("--froxel.grid", "16,9,8", "--truth", "march", "--out", "result")
+    document = run_json(capsys, *words)
     assert {"adapter", "scene", "triangles", "size", "results"} <= set(document)
     assert [result["technique"] for result in document["results"]] == ["off", "froxel"]
     for result in document["results"]:
@@ -160,10 +162,28 @@ def test_compare_prints_the_documented_json_and_fills_a_folder(
     kept = json.loads((folder / "result/results.json").read_text())
     assert kept["scene_hash"]
     assert kept["parameters"]["volumetric"]["froxel"]["grid"] == [16, 9, 8]
+    assert kept["command"] == shlex.join(["tyndall", *words, "--json"])
+    assert not (folder / "result/report.html").exists()
+
+
+def test_shadows_are_compared_against_a_traced_truth_and_reported(
+    capsys: pytest.CaptureFixture[str], folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("TYNDALL_CACHE", str(folder / "cache"))
+    words = ("compare", "box", "--family", "shadow", "--technique", "shadow_map", "--volumetric", "march")
+    words += ("--truth.target", "1", "--truth.samples", "32", "--size", "32x18", "--frames", "1", "--report")
+    code, out, err = run(capsys, *words, "--out", "made")
+    assert code == 0, err
+    assert "the report is made/report.html" in out
+    assert "truth: traced, 32 samples a pixel" in out
+    kept = json.loads((folder / "made/results.json").read_text())
+    assert kept["reference"]["settings"]["target"] == 1
+    assert kept["parameters"]["volumetric"]["technique"] == "march"
+    assert "<html" in (folder / "made/report.html").read_text()
 
 
 def test_compare_prints_a_table(capsys: pytest.CaptureFixture[str]) -> None:
-    words = ("compare", "box", "--technique", "off", "--reference", "none", "--size", "16x9", "--frames", "1")
+    words = ("compare", "box", "--technique", "off", "--truth", "none", "--size", "16x9", "--frames", "1")
     code, out, _ = run(capsys, *words)
     assert code == 0
     assert "off" in out
@@ -287,7 +307,17 @@ def test_a_specification_in_a_file_is_not_mixed_with_flags(capsys: pytest.Captur
         ("render box --out taken/inside", "taken"),
         ("compare box --technique off,frxel", "did you mean 'froxel'?"),
         ("compare box --technique ,", "--technique: no name is given"),
-        ("compare box --reference froxel --technique off --size 16x9", "march"),
+        ("compare box --truth froxel --technique off --size 16x9", "'march'"),
+        ("compare box --truth.trget 1", "--truth.trget: 'truth' has no parameter 'trget' — did you mean 'target'?"),
+        ("compare box --truth.target 2", "--truth.target: 2 is outside 0 … 1"),
+        ("compare box --truth march --truth.seconds 3 --size 16x9", "only one that is traced"),
+        ("compare box --truth.filter box --size 16x9", "filter: "),
+        ("compare box --family shadow --truth march --size 16x9", "cannot judge it; use 'traced'"),
+        ("compare box --family shadow --technique froxel", "no shadow technique 'froxel'"),
+        ("compare box --family shadow --shadow shadow_map", "--shadow: it is shadow techniques that are compared"),
+        ("compare box --family shadow --model both", "--model: only volumetric techniques have models"),
+        ("compare box --volumetric froxel", "--volumetric: it is volumetric techniques that are compared"),
+        ("render box --truth.seconds 3", "--truth.seconds: no technique 'truth'"),
         ("compare broken.json", "broken.json"),
         ("techniques froxl", "did you mean 'froxel'?"),
         ("doctor --froxel.grid 1,2,3", "--froxel.grid"),
@@ -325,7 +355,7 @@ def test_a_fault_is_not_called_a_mistake(capsys: pytest.CaptureFixture[str], mon
 def test_what_was_in_the_folder_stays(capsys: pytest.CaptureFixture[str], folder: Path) -> None:
     (folder / "result").mkdir()
     (folder / "result/notes.txt").write_text("mine")
-    words = ("compare", "box", "--technique", "off", "--reference", "none", "--size", "16x9", "--frames", "1")
+    words = ("compare", "box", "--technique", "off", "--truth", "none", "--size", "16x9", "--frames", "1")
     assert run(capsys, *words, "--out", "result")[0] == 0
     assert (folder / "result/notes.txt").read_text() == "mine"
     assert (folder / "result/off.png").exists()

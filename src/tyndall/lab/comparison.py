@@ -26,6 +26,8 @@ from tyndall.lab.standard import KINDS, LAYERS, SYMBOLS, Standard
 if TYPE_CHECKING:
     from rich.table import Table
 
+_NOISY = 0.01  # the truth's relative standard error from which on its noise is seen by every metric
+
 
 @dataclass(frozen=True)
 class Error:
@@ -214,7 +216,9 @@ class Comparison:
         if self.reference:
             notes.append(self.reference.caption())
         if any(r.main and r.main.within_noise for r in self.results):
-            notes.append("<: less than this is hidden in the truth's noise, which FLIP and PSNR see as well")
+            notes.append("<: less than this is hidden in the truth's noise")
+        if self.reference and self.reference.noise["radiance"] > _NOISY:
+            notes.append("FLIP and PSNR count the truth's noise as well")
         if any(not result.measurement.passes for result in self.results):
             notes.append("this adapter cannot time what it draws (timestamp-query)")
         if any(result.model == "paper" for result in self.results):

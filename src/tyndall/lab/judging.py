@@ -124,9 +124,11 @@ class _Worker:
             _Died: there was no answer.
         """
         try:
-            if self._process is None:
-                self._process = self._start()
-            requests, answers = _pipes(self._process)
+            new = self._process is None
+            process = self._process = self._process or self._start()
+            requests, answers = _pipes(process)
+            if new:
+                requests.write(self._targets)
             pickle.dump(pictures, requests, pickle.HIGHEST_PROTOCOL)
             requests.flush()
             answer: dict[str, Scores] | str = pickle.load(answers)
@@ -139,7 +141,7 @@ class _Worker:
         threads = max(1, (cores() - 1) // self._count)  # FLIP's, which would else take every core in each worker
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
         environment["OMP_NUM_THREADS"] = str(threads)
-        process = subprocess.Popen(
+        return subprocess.Popen(
             [sys.executable, "-c", _PROGRAM],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
@@ -147,9 +149,6 @@ class _Worker:
             env=environment,
             start_new_session=True,  # an interrupt at the terminal is the parent's to handle
         )
-        requests, _ = _pipes(process)
-        requests.write(self._targets)
-        return process
 
     def end(self, patience_s: float = 0.0) -> int | None:
         """Wait that long for the process to end, then kill it; its exit code where it ended by itself."""
