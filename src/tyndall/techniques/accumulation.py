@@ -6,6 +6,9 @@ surface: of like depth and normal, each of four neighbours by itself. While the 
 that of all frames since then, so it converges to the truth; while it moves, the mean looks back as far as the technique
 says, since each look between pixels blurs.
 
+Where there is no mean yet, the first batch of samples is larger. One sample alone would show for long: antialiasing
+takes the mean of pictures, and each of the next few holds mostly that sample.
+
 A mean is kept in 32 bits, of which 21 are of the value, in 0 … 1 with both ends exact, and 11 of the number of frames.
 ``accumulation.wesl`` is the shader's side; it imports what :func:`accumulated` binds.
 """

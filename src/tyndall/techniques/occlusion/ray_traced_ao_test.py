@@ -50,7 +50,7 @@ def seen(scene: Scene) -> tuple[np.ndarray, props.Hit]:
 def test_a_plane_is_open(gpu: Gpu, scale: float, radius: float) -> None:
     camera = replace(ABOVE, position=tuple(scale * x for x in ABOVE.position), target=(0, 0, 0), near=0.02 * scale)
     scene = Scene([props.floor(0, 20 * scale)], camera=camera)
-    got = openness(gpu, scene, RayTracedAo(radius=radius * scale, samples=8), frames=1)
+    got = openness(gpu, scene, RayTracedAo(radius=radius * scale, samples=8, fresh=1), frames=1)
     assert (got[np.isfinite(seen(scene)[1].distance)] == 1).all()
 
 
@@ -66,7 +66,7 @@ def test_a_corner_of_two_planes_is_the_closed_form(gpu: Gpu, height: float, radi
     """
     scene = Scene([props.floor(0, 200), upright(-0.4, height)], camera=ABOVE)
     rays, frames = 32, 4
-    got = openness(gpu, scene, RayTracedAo(radius=radius, samples=rays), frames)
+    got = openness(gpu, scene, RayTracedAo(radius=radius, samples=rays, fresh=1), frames)
     points, hit = seen(scene)
     x = points[..., 0] + 0.4
     floor = (hit.instance == 0) & (x > 0.01) & (np.abs(points).max(-1) < 5)
@@ -88,7 +88,7 @@ def test_a_corner_of_two_planes_is_the_closed_form(gpu: Gpu, height: float, radi
 def test_the_inside_of_a_closed_box_is_dark(gpu: Gpu) -> None:
     room = props.box((-1, -1, -1), (2, 2, 3), replace(WHITE, double_sided=True))
     scene = Scene([room], camera=Camera((0.5, 0.5, 2.0), (0, 0, 0), fov=0.8, near=0.02))
-    assert (openness(gpu, scene, RayTracedAo(radius=FAR), frames=2) == 0).all()
+    assert (openness(gpu, scene, RayTracedAo(radius=FAR, fresh=2), frames=2) == 0).all()
     assert openness(gpu, scene, RayTracedAo(radius=0.05), frames=2).mean() > 0.95
 
 
@@ -99,25 +99,25 @@ def test_only_the_ambient_light_is_dimmed(gpu: Gpu) -> None:
     assert np.array_equal(draw(gpu, lit, RayTracedAo()), draw(gpu, lit, NoOcclusion()))
     both = lit.with_(ambient=AMBIENT)
     rest = draw(gpu, lit, NoOcclusion())
-    open_light, dimmed = draw(gpu, both, NoOcclusion()) - rest, draw(gpu, both, RayTracedAo(samples=16)) - rest
+    open_light, dimmed = draw(gpu, both, NoOcclusion()) - rest, draw(gpu, both, RayTracedAo(samples=16, fresh=1)) - rest
     assert (dimmed <= open_light + 2e-3).all()
     assert (dimmed < 0.8 * open_light)[..., 1].mean() > 0.1
 
 
 def test_the_mean_of_frames_is_that_of_their_rays(gpu: Gpu) -> None:
     scene = Scene([props.floor(0, 20), upright(-0.4, 1.0)], camera=ABOVE)
-    gathered = openness(gpu, scene, RayTracedAo(samples=2), frames=24)
-    at_once = openness(gpu, scene, RayTracedAo(samples=48), frames=1)
+    gathered = openness(gpu, scene, RayTracedAo(samples=2, fresh=1), frames=24)
+    at_once = openness(gpu, scene, RayTracedAo(samples=48, fresh=1), frames=1)
     np.testing.assert_allclose(gathered, at_once, atol=2e-3)  # of half floats
 
 
 def test_a_moving_camera_keeps_what_it_has_gathered(gpu: Gpu) -> None:
     scene = Scene([props.floor(0, 20), upright(-0.4, 1.0)], camera=ABOVE, ambient=AMBIENT)
     end = replace(ABOVE, position=(0.98, 1.1, 1.6), target=(0.28, 0, 0))
-    truth = draw(gpu, scene, RayTracedAo(samples=128), 2, end)
-    single = draw(gpu, scene, RayTracedAo(), 1, end)
+    truth = draw(gpu, scene, RayTracedAo(samples=128, fresh=1), 2, end)
+    single = draw(gpu, scene, RayTracedAo(fresh=1), 1, end)
     with Renderer(
-        scene, SIZE, gpu=gpu, volumetric="off", antialiasing="none", tonemap="none", occlusion=RayTracedAo()
+        scene, SIZE, gpu=gpu, volumetric="off", antialiasing="none", tonemap="none", occlusion=RayTracedAo(fresh=1)
     ) as renderer:
         for step in range(17):
             u = step / 16

@@ -185,7 +185,7 @@ def test_the_penumbra_of_an_edge_is_the_closed_form(gpu: Gpu, light: Light) -> N
     camera = Camera((0.4, 1.4, 0.2), (0.1, 0, 0), fov=0.7, near=0.05)
     scene = Scene([props.floor(0, 30), roof(2.0)], [light], camera)
     rays, frames = 16, 8
-    got = visible(gpu, scene, RayTraced(samples=rays), frames=frames)
+    got = visible(gpu, scene, RayTraced(samples=rays, fresh=1), frames=frames)
     points, hit = seen_points(scene)
     floor = hit.instance == 0
     expected = penumbra(light, 2.0, points)
@@ -209,7 +209,7 @@ def test_a_shrinking_light_ends_as_a_hard_one(gpu: Gpu) -> None:
     differs = []
     for radius in (0.4, 0.1, 0.025, 1e-4):
         scene = Scene(shapes, [replace(lamp, radius=radius)], ABOVE)
-        differs.append(np.abs(visible(gpu, scene, RayTraced(samples=16)) - hard).mean())
+        differs.append(np.abs(visible(gpu, scene, RayTraced(samples=16, fresh=1)) - hard).mean())
     assert differs[0] > 0.02
     assert differs[0] > 2 * differs[1] > 4 * differs[2]
     assert differs[3] < 1e-3
@@ -226,7 +226,7 @@ def test_a_hard_light_stays_hard_beside_a_soft_one(gpu: Gpu) -> None:
 
 def test_a_light_that_the_point_is_inside_of_fills_a_half_space(gpu: Gpu) -> None:
     scene = Scene([props.floor(0, 4)], [PointLight((0, 0.5, 0), 9.0, radius=2.0)], ABOVE)
-    got = visible(gpu, scene, RayTraced(samples=16))
+    got = visible(gpu, scene, RayTraced(samples=16, fresh=1))
     assert np.isfinite(got).all()
     assert got.max() == 1
 
@@ -238,21 +238,23 @@ SOFT = Scene([props.floor(0, 4), CUBE], [DirectionalLight((0.5, -1.0, -0.35), 3.
 
 def test_a_still_picture_is_the_mean_of_all_its_frames(gpu: Gpu) -> None:
     """Frames of one sample each are the same samples as one frame of many: equal but for 20 bits of rounding."""
-    with renderer(gpu, SOFT, RayTraced(samples=1)) as one:
+    with renderer(gpu, SOFT, RayTraced(samples=1, fresh=1)) as one:
         for _ in range(40):
             one.draw()
         gathered, frames = answers(one, 40)
-    at_once = visible(gpu, SOFT, RayTraced(samples=40))
+    at_once = visible(gpu, SOFT, RayTraced(samples=40, fresh=1))
+    begun = visible(gpu, SOFT, RayTraced(samples=1, fresh=15), frames=26)
     lit = frames > 0
     assert lit.mean() > 0.5
     assert (frames[lit] == 40).all()
     np.testing.assert_allclose(gathered, at_once, atol=40 * 2.0**-20)
+    np.testing.assert_allclose(begun, at_once, atol=40 * 2.0**-20)
 
 
 def test_the_error_falls_faster_than_at_random(gpu: Gpu) -> None:
-    truth = visible(gpu, SOFT, RayTraced(samples=256), frames=4)
+    truth = visible(gpu, SOFT, RayTraced(samples=256, fresh=1), frames=4)
     errors = {}
-    with renderer(gpu, SOFT) as made:
+    with renderer(gpu, SOFT, RayTraced(fresh=1)) as made:
         for frame in range(1, 65):
             made.draw()
             if frame in (1, 4, 16, 64):
@@ -279,7 +281,7 @@ def test_a_restart_forgets(gpu: Gpu) -> None:
         made.draw()
         again = answers(made, 1)
     assert np.array_equal(first[0], again[0])
-    assert again[1].max() == 1
+    assert again[1].max() == RayTraced().fresh
 
 
 def moved(step: int) -> Camera:
@@ -289,9 +291,9 @@ def moved(step: int) -> Camera:
 def test_a_moving_camera_takes_its_shadows_along(gpu: Gpu) -> None:
     """Most pixels keep their mean; it is better than one frame's, and not dragged to one side."""
     end = SOFT.with_(camera=moved(24))
-    truth = visible(gpu, end, RayTraced(samples=256), frames=2)
-    single = visible(gpu, end)
-    with renderer(gpu, SOFT, RayTraced(history=16)) as made:
+    truth = visible(gpu, end, RayTraced(samples=256, fresh=1), frames=2)
+    single = visible(gpu, end, RayTraced(fresh=1))
+    with renderer(gpu, SOFT, RayTraced(fresh=1, history=16)) as made:
         for step in range(25):
             made.draw(moved(step))
         got, frames = answers(made, 25)
@@ -308,7 +310,7 @@ def test_what_comes_into_view_starts_anew(gpu: Gpu) -> None:
     scene = SOFT.with_(instances=(props.floor(0, 4), post))
     near = Camera((0, 1.5, 3.5), (0, 0.5, 0), fov=0.9, near=0.05)
     aside = replace(near, position=(0.5, 1.5, 3.5), target=(0.5, 0.5, 0))
-    with renderer(gpu, scene) as made:
+    with renderer(gpu, scene, RayTraced(fresh=2)) as made:
         for _ in range(9):
             made.draw(near)
         made.draw(aside)
@@ -319,7 +321,7 @@ def test_what_comes_into_view_starts_anew(gpu: Gpu) -> None:
     uncovered = hidden & np.roll(hidden, 1, 1) & np.roll(hidden, -1, 1)  # not at the border
     kept = (hit.instance == 0) & (before.distance > 0.999) & (np.abs(points[..., 0]) < 1.5) & (frames > 0)
     assert uncovered.sum() > 20
-    assert (frames[uncovered] == 1).mean() > 0.95
+    assert (frames[uncovered] == 2).mean() > 0.95
     assert np.median(frames[kept]) > 5
 
 
