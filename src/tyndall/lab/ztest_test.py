@@ -1,0 +1,67 @@
+import numpy as np
+import pytest
+
+from tyndall.lab.ztest import z_test
+
+
+def noise(seed: int, shape: tuple[int, ...] = (24, 24, 3)) -> np.ndarray:
+    return np.random.default_rng(seed).normal(size=shape)
+
+
+def test_equal_pictures_differ_about_as_often_as_the_significance_says() -> None:
+    truth = np.linspace(0.5, 2, 24 * 24 * 3).reshape(24, 24, 3)
+    error = 0.1 * truth
+    tests = [z_test(truth + error * noise(seed), truth, error, significance=0.1, tolerance=0) for seed in range(400)]
+    # 400 tests at 10 % each for the largest z; about 3 standard deviations of the binomial.
+    assert 22 <= sum(not test for test in tests) <= 58
+    assert np.mean([test.spread for test in tests]) == pytest.approx(1, abs=5e-3)
+
+
+def test_the_critical_value_is_sidaks() -> None:
+    # One value and the sum: each at 1 − √0.99 = 0.501 %, a two-sided 2.806 standard deviations.
+    assert z_test(np.ones(1), np.ones(1), 0.1).critical == pytest.approx(2.806, abs=1e-3)
+    # 1,728 values: 5.81e-6 each.
+    assert z_test(np.ones((24, 24, 3)), np.ones((24, 24, 3)), 0.1).critical == pytest.approx(4.53, abs=0.01)
+
+
+def test_one_pixel_that_is_off_is_found_and_named() -> None:
+    picture = 1 + 0.01 * noise(3)
+    picture[5, 7, 1] += 0.08
+    found = z_test(picture, np.ones_like(picture), 0.01)
+    assert not found
+    assert found.where == (5, 7, 1)
+    assert "different" in str(found)
+
+
+def test_a_bias_too_small_for_any_pixel_is_found_in_the_sum() -> None:
+    picture = 1 + 0.05 * noise(4)
+    assert z_test(picture, np.ones_like(picture), 0.05)
+    found = z_test(picture * 1.01, np.ones_like(picture), 0.05)
+    assert not found
+    assert found.worst < found.critical < found.bias
+
+
+def test_both_errors_count() -> None:
+    picture = 1 + 0.05 * noise(5)
+    other = 1 + 0.05 * noise(6)
+    both = z_test(picture, other, 0.05, 0.05)
+    assert both
+    assert both.spread == pytest.approx(1, abs=0.05)
+    assert not z_test(picture, other, 0.03)
+
+
+def test_exact_values_must_be_equal_but_for_rounding() -> None:
+    exact = np.array([0.0, 1.0, 2.0])
+    assert z_test(exact, exact, 0.0)
+    assert z_test(exact * (1 + 5e-5), exact, 0.0)
+    wrong = z_test(exact + [0, 0, 1e-3], exact, 0.0)
+    assert not wrong
+    assert wrong.where == (2,)
+    assert wrong.worst == np.inf
+
+
+def test_what_cannot_be_compared_is_said() -> None:
+    with pytest.raises(ValueError, match="shapes"):
+        z_test(np.ones(3), np.ones(4), 0.1)
+    with pytest.raises(ValueError, match="not finite"):
+        z_test(np.array([np.nan]), np.ones(1), 0.1)
