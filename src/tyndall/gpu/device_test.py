@@ -208,3 +208,53 @@ def test_listing_adapters_leaves_the_environment_alone(monkeypatch: pytest.Monke
     before = dict(os.environ)
     assert adapters()
     assert dict(os.environ) == before
+
+
+_DOUBLE = """
+import package::bindings::{values_at, doubled_at, doubled_put, count};
+import package::tracing::line::line_group;
+@compute @workgroup_size(8)
+fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) local: u32) {
+    let i = line_group(group) * 8u + local;
+    if i < count {
+        doubled_put(i, doubled_at(i) + 2u * values_at(i));
+    }
+}
+"""
+
+
+@pytest.mark.parametrize(("part_bytes", "parts"), [(1 << 20, 1), (1024, 4), (768, 8)])
+def test_a_buffer_in_parts_is_one_to_the_shader(
+    gpu: Gpu, monkeypatch: pytest.MonkeyPatch, part_bytes: int, parts: int
+) -> None:
+    """Parts are powers of two of elements; the last is shorter. Chained dispatches see each other's results."""
+    monkeypatch.setattr(gpu, "part_bytes", part_bytes)
+    values = np.arange(1000, dtype=np.uint32)
+    with (
+        gpu.buffer("values", values, owner="test") as source,
+        gpu.buffer("doubled", values, owner="test") as target,
+        props.module(gpu, f"double_{parts}", _DOUBLE) as path,
+    ):
+        assert len(target.split(write=True).bounds) == parts
+        scope = {"values": source.split(), "doubled": target.split(write=True), "count": gpu.constant(1000)}
+        prepared = gpu.compute("test.double", path).bind(scope).prepare()
+        with gpu.chain("test.chain"):
+            prepared.line(1000)
+            prepared.line(1000)
+        assert (gpu.read_buffer(target)[:1000] == 5 * values).all()
+        assert [label for label, _ in gpu.timings()] in ([], ["test.chain", "frame"])
+        gpu.forget_groups()
+
+
+def test_a_line_of_more_workgroups_than_one_dimension_holds(gpu: Gpu) -> None:
+    values = np.arange(8 * 70_000 + 3, dtype=np.uint32)
+    with (
+        gpu.buffer("values", values, owner="test") as source,
+        gpu.buffer("doubled", 4 * len(values), owner="test") as target,
+        props.module(gpu, "double_line", _DOUBLE) as path,
+    ):
+        gpu.compute("test.double", path).bind(
+            values=source.split(), doubled=target.split(write=True), count=gpu.constant(len(values))
+        ).dispatch_line(len(values))
+        assert (gpu.read_buffer(target) == 2 * values).all()
+        gpu.forget_groups()
