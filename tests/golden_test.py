@@ -13,10 +13,12 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 import props
@@ -32,6 +34,7 @@ from tyndall.scene.model import (
     HenyeyGreenstein,
     Image,
     Instance,
+    Light,
     Material,
     Medium,
     PointLight,
@@ -120,14 +123,36 @@ CASES = [
 ]
 
 
+# What rays do to surfaces, and to the air: the scene, whether its lights have a size, and the techniques.
+TRACED: dict[str, tuple[str, bool, dict[str, str]]] = {
+    "shafts-ray_traced": ("shafts", False, {"volumetric": "froxel", "shadow": "ray_traced"}),
+    "shafts-ray_traced-soft": ("shafts", True, {"volumetric": "froxel", "shadow": "ray_traced"}),
+    "lamps-ray_traced-soft": ("lamps", True, {"volumetric": "off", "shadow": "ray_traced"}),
+    "box-ray_traced_ao": ("box", False, {"volumetric": "off", "shadow": "ray_traced", "occlusion": "ray_traced_ao"}),
+}
+
+
 @cache
 def scene(name: str) -> Scene:
     return SCENES[name]()
 
 
-def draw(gpu: Gpu, what: Scene, technique: str, changes: dict[str, str], frames: int = FRAMES) -> np.ndarray:
+def with_size(light: Light) -> Light:
+    if isinstance(light, DirectionalLight):
+        return replace(light, angular_diameter=0.1)
+    return replace(light, radius=0.15)
+
+
+def draw(
+    gpu: Gpu,
+    what: Scene,
+    technique: str,
+    changes: Mapping[str, Any] = MappingProxyType({}),
+    frames: int = FRAMES,
+    **others: str,
+) -> np.ndarray:
     made = FAMILIES["volumetric"].make(technique, what.looks, {**_SMALL.get(technique, {}), **changes})
-    with Renderer(what, SIZE, gpu=gpu, volumetric=made) as renderer:
+    with Renderer(what, SIZE, gpu=gpu, volumetric=made, **others) as renderer:
         for _ in range(frames):
             renderer.draw()
         return renderer.picture()
@@ -146,7 +171,22 @@ def differs(a: np.ndarray, b: np.ndarray) -> tuple[float, float]:
 )
 def test_picture(software: Gpu, name: str, technique: str, changes: dict[str, str], tmp_path: Path) -> None:
     got = draw(software, scene(name), technique, changes)
-    path = FOLDER / ("-".join([name, technique, *changes.values()]) + ".png")
+    compare(got, FOLDER / ("-".join([name, technique, *changes.values()]) + ".png"), tmp_path)
+
+
+@pytest.mark.parametrize("title", TRACED)
+def test_picture_with_rays(software: Gpu, title: str, tmp_path: Path) -> None:
+    name, soft, families = TRACED[title]
+    what = scene(name)
+    if soft:
+        what = what.with_(lights=tuple(map(with_size, what.lights)))
+    others = {family: technique for family, technique in families.items() if family != "volumetric"}
+    few = {"grid": (48, 27, 32)} if families["volumetric"] == "froxel" else {}  # each froxel asks a ray
+    compare(draw(software, what, families["volumetric"], few, **others), FOLDER / f"{title}.png", tmp_path)
+
+
+def compare(got: np.ndarray, path: Path, tmp_path: Path) -> None:
+    """Fail, and leave the picture in ``tmp_path``, where it differs from the kept one."""
     if os.environ.get("TYNDALL_UPDATE_GOLDENS") == "1":
         FOLDER.mkdir(exist_ok=True)
         Picture.fromarray(got).save(path, optimize=True)
@@ -183,4 +223,5 @@ def test_a_small_fault_is_seen(software: Gpu) -> None:
 
 def test_no_golden_is_left_over() -> None:
     known = {"-".join([name, technique, *changes.values()]) + ".png" for name, technique, changes in CASES}
+    known |= {f"{title}.png" for title in TRACED}
     assert {p.name for p in FOLDER.iterdir()} == known
