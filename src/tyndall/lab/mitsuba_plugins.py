@@ -274,10 +274,12 @@ def _reflection(mi: Any, dr: Any, read: Callable[..., Any]) -> Callable[..., Any
             return mi.Float(float(self.given["double_sided"]))
 
         def eval_attribute_3(self, name: str, si: Any, active: Any = True) -> Any:
-            """Emitted radiance and reflected ambient light."""
-            texel = self.maps["emissive"].at(si.uv) if "emissive" in self.maps else (1, 1, 1)
-            emissive = mi.Color3f(self.given["emissive"]) * mi.Color3f(texel[0], texel[1], texel[2])
-            return emissive + mi.Color3f(self.ambient) * self.base(si)[0]
+            """What only the eye sees: reflected ambient light, and emitted where paths end and emitters are none."""
+            light = mi.Color3f(self.ambient) * self.base(si)[0]
+            if self.last:
+                texel = self.maps["emissive"].at(si.uv) if "emissive" in self.maps else (1, 1, 1)
+                light = light + mi.Color3f(self.given["emissive"]) * mi.Color3f(texel[0], texel[1], texel[2])
+            return light
 
         def to_string(self) -> str:
             return "TyndallReflection[]"

@@ -294,14 +294,15 @@ class Tracer:
         if len(scene) == 1 + len(content["lights"]) and not medium:
             scene["nothing"] = {"type": "sphere", "radius": 1e-6, "center": [0.0, -1e6, 0.0]}
         self.scene = mi.load_dict(scene)
-        self.integrator = mi.load_dict(
-            {
-                "type": "volpath" if grey else "volpathmis",
-                "max_depth": content["depth"],
-                "rr_depth": 1000,
-                "hide_emitters": True,  # from the eye, which sees them without noise
-            }
-        )
+
+        def integrator(hide: bool) -> Any:
+            kind = "volpath" if grey else "volpathmis"
+            depth = {"max_depth": content["depth"], "rr_depth": 1000}
+            return mi.load_dict({"type": kind, **depth, "hide_emitters": hide})
+
+        self.integrator = integrator(False)
+        # A ray that ends in the air would see the background there. (To hide an emissive surface is to see through it.)
+        self.air_integrator = integrator(True)
         self.sampler = mi.load_dict({"type": "independent"})
 
     # --- samples --------------------------------------------------------------------------------------------------
@@ -373,7 +374,8 @@ class Tracer:
         surfaces = sight["emitted"] + sight["dimmed"] * self._reflected(sight)
         inscattered = self.mi.Color3f(0.0)
         if self.medium is not None and any(self.content["medium"]["scattering"]):
-            inscattered = self._light(sight["air"], self.medium, sight["has_air"]) * sight["air_weight"]
+            light = self._light(self.air_integrator, sight["air"], self.medium, sight["has_air"])
+            inscattered = light * sight["air_weight"]
         return inscattered, surfaces, sight["culled"]
 
     def _sight(self, pixel: Any) -> dict[str, Any]:
@@ -409,18 +411,18 @@ class Tracer:
             "air_weight": self._dimmed(first - begin) * seen["parts"],
         }
 
-    def _light(self, ray: Any, medium: Any, active: Any) -> Any:
+    def _light(self, integrator: Any, ray: Any, medium: Any, active: Any) -> Any:
         mi, dr = self.mi, self.dr
         if self.scalar and not active:
             return mi.Color3f(0.0)
-        light, _, _ = self.integrator.sample(self.scene, self.sampler, ray, medium, active)
+        light, _, _ = integrator.sample(self.scene, self.sampler, ray, medium, active)
         return dr.select(active, light, 0.0)
 
     def _reflected(self, sight: dict[str, Any]) -> Any:
         """Light that a surface reflects towards the eye, seen from just before it."""
-        light = self._light(sight["ray"], self.medium, sight["hit_in_air"])
+        light = self._light(self.integrator, sight["ray"], self.medium, sight["hit_in_air"])
         if self.may_be_outside:
-            light = light + self._light(sight["ray"], None, sight["hit_outside"])
+            light = light + self._light(self.integrator, sight["ray"], None, sight["hit_outside"])
         return light
 
     def _dimmed(self, length: Any) -> Any:
