@@ -19,18 +19,25 @@ from tyndall.scene.model import (
     Instance,
     Light,
     Material,
+    Medium,
     PointLight,
     Scene,
     SpotLight,
     Texture,
 )
 from tyndall.techniques import FAMILIES, Technique
+from tyndall.techniques.volumetric.march import March
 
 FAMILY = FAMILIES["shadow"]
 ALL = tuple(FAMILY.members)
 SIZE = (96, 72)
 ABOVE = Camera((2.5, 4, 4.5), (0, 0.3, 0), fov=0.8, near=0.05)
 MAPS: dict[str, dict[str, Any]] = {"shadow_map": {"size": 1024}}
+BIG = {
+    "directional": {"angular_diameter": 0.2},
+    "point": {"radius": 0.2},
+    "spot": {"radius": 0.2},
+}
 
 LIGHTS: list[Any] = [
     pytest.param(DirectionalLight((0.5, -1.0, -0.35), 3.0), id="directional"),
@@ -153,6 +160,88 @@ def test_a_spot_light_fades_at_its_cone(gpu: Gpu, name: str) -> None:
     base = shoot(gpu, scene, SIZE, shadow=make(name)).base[..., 0]
     np.testing.assert_allclose(base[onto], expected[onto], atol=0.01 * expected.max())
     assert (base[onto] == 0).any()
+
+
+@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize("light", LIGHTS)
+def test_a_light_with_a_radius_is_hidden_whole_or_not_at_all(gpu: Gpu, name: str, light: Light) -> None:
+    """Whatever a technique makes of the penumbra: what all points of the light reach is lit, what none does is dark."""
+    big = replace(light, **BIG[light.kind])
+    scene = Scene([props.floor(0, 4), CUBE], [big], ABOVE)
+    visible, sure, points, hit = seen_visibility(gpu, scene, make(name))
+    floor = sure & (hit.instance == 0)
+    parts = [props.lit(scene, part, points) for part in _parts(big)]
+    all_of_it, none_of_it = np.all(parts, axis=0) & floor, ~np.any(parts, axis=0) & floor
+    assert all_of_it.sum() > 500
+    assert none_of_it.sum() > 20
+    # The parts are the rim and beyond; the map's texels are left to the other tests.
+    assert (visible[all_of_it] > 0.97).mean() > 0.995
+    assert (visible[none_of_it] < 0.03).mean() > 0.98
+
+
+def _parts(light: Light) -> list[Light]:
+    """Points on and a little outside of the rim of a light, and its centre."""
+    rng = np.random.default_rng(2)
+    found: list[Light] = [light]
+    for offset in rng.normal(size=(24, 3)):
+        offset /= np.linalg.norm(offset)
+        if isinstance(light, DirectionalLight):
+            travel = np.array(light.direction) / np.linalg.norm(light.direction)
+            across = np.cross(travel, offset)
+            across *= 1.1 * math.tan(light.angular_diameter / 2) / np.linalg.norm(across)
+            found.append(replace(light, direction=tuple(travel + across)))
+        else:
+            found.append(replace(light, position=tuple(np.array(light.position) + 1.1 * light.radius * offset)))
+    return found
+
+
+@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize(
+    "light",
+    [
+        pytest.param(DirectionalLight((0.3, -0.1, 1.0), 5.0), id="directional"),
+        pytest.param(PointLight((1.5, 4.5, -6.0), 60.0), id="point"),
+        pytest.param(SpotLight((0.5, 5.0, -6.5), (0.0, -1.2, 1.0), 90.0, (1, 1, 1), 0.4, 0.6), id="spot"),
+    ],
+)
+def test_the_air_is_shaded_as_rays_see_it(gpu: Gpu, name: str, light: Light) -> None:
+    """Shafts through slits: the march's sum against the same sum over rays cast from the air."""
+    medium = Medium(0.05, 0.01, bounds=((-6, -6, -8), (6, 6, 3)))
+    camera = Camera((0.4, 0.3, 1.5), (0, 0, -4), fov=0.9, near=0.05)
+    scene = Scene([*props.slits(-3, 3, 0.5, 3), props.floor(-1.5, 9)], [light], camera, medium)
+    size, steps = (16, 12), 128
+    shot = shoot(gpu, scene, size, volumetric=March(steps=256, jitter=0), shadow=make(name))
+    got = shot.inscattered[..., 0]
+    seen = props.rays(camera, size)
+    begin, end = props.hit_box(seen.origin, seen.directions, *medium.bounds)  # type: ignore[misc]
+    begin = np.maximum(begin, 0)
+    end = np.minimum(end, shot.depth * seen.stretch)
+    sigma = np.array(medium.extinction)
+    total, shaded = np.zeros_like(got), 0.0
+    for step in range(steps):
+        t = begin + (end - begin) * (step + 0.5) / steps
+        points = seen.at(t)
+        irradiance, travels = props.arriving(light, sigma * (not isinstance(light, DirectionalLight)), points)
+        p = props.phase(medium.phase, -(travels * seen.directions).sum(-1))
+        lit = props.lit(scene, light, points)
+        part = irradiance[..., 0] * p * lit * np.exp(-sigma[0] * (t - begin)) * (end - begin) / steps
+        total += medium.scattering[0] * part
+        shaded += (~lit).mean() / steps
+    assert 0.1 < shaded < 0.9
+    assert props.difference(got, total) < 0.03
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_a_scene_without_lights_or_shapes_is_drawn(gpu: Gpu, name: str) -> None:
+    dark = shoot(gpu, Scene([props.floor(0, 4)], [], ABOVE, ambient=(0.5, 0.5, 0.5)), SIZE, shadow=make(name))
+    assert dark.base[-1].min() == pytest.approx(0.5, rel=2e-3)
+    light = DirectionalLight((0.3, -0.1, 1.0), 5.0)
+    empty = Scene([], [light], ABOVE, Medium(0.05, bounds=((-1, -1, -1), (1, 1, 1))))
+    got = shoot(gpu, empty, SIZE, volumetric="march", shadow=make(name)).inscattered
+    seen = props.rays(ABOVE, SIZE)
+    begin, end = props.hit_box(seen.origin, seen.directions, (-1, -1, -1), (1, 1, 1))
+    expected = props.lit_slab(empty, SIZE, np.where(end > begin, begin, 0), np.where(end > begin, end, 0), begin)
+    np.testing.assert_allclose(got[..., 0], np.where(end > begin, expected[..., 0], 0), rtol=1e-3, atol=1e-5)
 
 
 CULLING = [("none", 0.99), ("back", 0.99), ("front", 0.985)]
