@@ -11,6 +11,7 @@ import pytest
 import tyndall
 from tyndall.app import arguments
 from tyndall.app.cli import main
+from tyndall.lab.truth import TruthSettings
 from tyndall.scene import bundled
 from tyndall.techniques import FAMILIES
 
@@ -54,7 +55,9 @@ def test_the_python_of_the_readme_uses_names_that_exist() -> None:
 def test_the_commands_of_the_readme_have_these_flags(command: str, capsys: pytest.CaptureFixture[str]) -> None:
     _, *words = shlex.split(command)
     rest, flags = arguments.split_flags(words)
-    members = {name: member for family in FAMILIES.values() for name, member in family.members.items()}
+    members: dict[str, type] = {name: member for family in FAMILIES.values() for name, member in family.members.items()}
+    if rest[0] == "compare":
+        members["truth"] = TruthSettings
     arguments.convert_flags(flags, members)
     assert main([rest[0], "--help"]) == 0
     page = capsys.readouterr().out

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from tyndall.lab.picture import Picture
     from tyndall.lab.render import render
     from tyndall.lab.sweep import Sweep, SweepError, sweep
+    from tyndall.lab.truth import Truth, TruthSettings, trace
     from tyndall.scene import bundled as scenes
     from tyndall.scene.errors import SceneError
     from tyndall.scene.files import load, save
@@ -92,6 +93,8 @@ __all__ = [
     "SweepError",
     "Taa",
     "Texture",
+    "Truth",
+    "TruthSettings",
     "__version__",
     "compare",
     "load",
@@ -100,6 +103,7 @@ __all__ = [
     "scenes",
     "stage",
     "sweep",
+    "trace",
 ]
 
 # Where the public names live, the light modules first.
@@ -118,6 +122,7 @@ _HOMES = (
     "tyndall.frame",
     "tyndall.lab.picture",
     "tyndall.lab.render",
+    "tyndall.lab.truth",
     "tyndall.lab.compare",
     "tyndall.lab.sweep",
 )
