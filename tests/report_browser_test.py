@@ -16,7 +16,16 @@ from typing import Any
 import numpy as np
 import pytest
 from PIL import Image
-from report_samples import EXPOSURE, SCENE, SIZE, TECHNIQUES, developed, save_comparison, save_old_comparison
+from report_samples import (
+    EXPOSURE,
+    SCENE,
+    SIZE,
+    TECHNIQUES,
+    developed,
+    save_comparison,
+    save_old_comparison,
+    save_sweep,
+)
 from report_samples import room as lights_of
 
 from tyndall.lab.report import write_report
@@ -52,9 +61,10 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     folder = tmp_path_factory.mktemp("pages")
     save_comparison(folder / "room")
     save_old_comparison(folder / "old")
+    save_sweep(folder / "sweep")
     for name in ("a", "b"):
         save_comparison(folder / "several" / name, f"room {name}")
-    return {name: write_report(folder / name) for name in ("room", "old", "several")}
+    return {name: write_report(folder / name) for name in ("room", "old", "several", "sweep")}
 
 
 @pytest.fixture(scope="module")
@@ -392,11 +402,12 @@ def test_the_keyboard_reaches_every_control_and_the_focus_is_seen(room: Opened) 
     assert {"left", "swap", "right", "show", "exposure", "tone", "in", "out", "fit", "stage", "divider"} <= reached
 
 
-@pytest.mark.parametrize("name", ["room", "several", "old"])
+@pytest.mark.parametrize("name", ["room", "several", "old", "sweep"])
 def test_a_phone_shows_it_without_scrolling_sideways(browser: Any, pages: dict[str, Path], name: str) -> None:
     opened = Opened(browser, pages[name], viewport={"width": 360, "height": 740}, has_touch=True, is_mobile=True)
     assert opened.tab.evaluate("[document.documentElement.scrollWidth, innerWidth]") == [360, 360]
-    assert opened.role("stage").bounding_box()["width"] <= 360
+    if name != "sweep":
+        assert opened.role("stage").bounding_box()["width"] <= 360
     assert opened.said == []
     opened.close()
 
@@ -491,5 +502,34 @@ def test_the_command_can_be_copied(browser: Any, pages: dict[str, Path]) -> None
     command = "tyndall compare 'a & b.glb' --truth traced --report"
     if opened.tab.locator(".copy").inner_text() == "Selected":
         assert opened.tab.evaluate("getSelection().toString()").strip() == command
+    assert opened.said == []
+    opened.close()
+
+
+def test_a_sweep_is_plotted_against_what_varies(browser: Any, pages: dict[str, Path]) -> None:
+    opened = Opened(browser, pages["sweep"])
+    plots = opened.tab.locator(".explorer")
+    assert plots.count() == 3
+    first = plots.first
+    assert first.locator("svg[role=img]").count() == 2, "one for each scene"
+    assert first.locator(".dot").count() == 12
+    named = first.locator('[data-role="legend"] > span').all_inner_texts()
+    assert [name.strip() for name in named] == ["froxel", "march"]
+    # Twice the lights take twice the time here: equal steps upwards on a logarithmic axis for 1, 2, and three for 8.
+    heights = [
+        float(first.locator(f'.dot[data-row="{row}"]').evaluate("(dot) => dot.getBBox().y + dot.getBBox().height / 2"))
+        for row in range(3)
+    ]
+    assert (heights[0] - heights[2]) / (heights[0] - heights[1]) == pytest.approx(3, rel=0.02)
+    first.locator('[data-role="facet"]').select_option("")
+    first.locator('[data-role="x"]').select_option("GPU time of the technique")
+    opened.settle()
+    assert first.locator("svg[role=img]").count() == 1
+    assert first.locator(".front").count() == 6, "a front for each scene and number of lights"
+    first.locator('[data-role="filters"] select').last.select_option(label="8")
+    opened.settle()
+    assert first.locator(".dot").count() == 4
+    opened.tab.locator('.sortable thead button[aria-label^="GPU time of the technique"]').click()
+    assert opened.tab.locator(".sortable tbody tr").count() == 12
     assert opened.said == []
     opened.close()

@@ -145,3 +145,26 @@ def save_old_comparison(folder: Path) -> dict[str, Any]:
     document["reference"] = {"technique": "march", "steps": 1024, "converged": True, "mean": 0.02}
     (folder / "results.json").write_text(json.dumps(document), encoding="utf-8")
     return document
+
+
+def save_sweep(folder: Path) -> list[dict[str, Any]]:
+    """Write a sweep of two scenes, two techniques and three numbers of lights; returns its rows."""
+    rows = []
+    for scene in ("box", "blinds"):
+        for technique, factor in (("froxel", 1.0), ("march", 3.0)):
+            for lights in (1, 2, 8):
+                point = {"scene": scene, "lights": lights, "size": [96, 54], "technique": {"technique": technique}}
+                errors = {"inscattered": {"rel_rmse_corrected": 0.3 / factor, "rel_rmse": 0.31 / factor}}
+                rows.append(
+                    {
+                        "id": f"{scene}-{technique}-{lights}",
+                        "status": "done",
+                        "point": point,
+                        "gpu_ms": {"median": factor * lights, "min": factor, "p95": 2 * factor * lights},
+                        "memory_bytes": 1_000_000,
+                        "errors": errors,
+                    }
+                )
+    folder.mkdir(parents=True)
+    (folder / "results.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows), encoding="utf-8")
+    return rows

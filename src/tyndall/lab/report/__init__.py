@@ -15,15 +15,16 @@ import os
 from pathlib import Path
 
 from tyndall.lab.picture import OutputError, write_atomically
+from tyndall.lab.report import sweep
 from tyndall.lab.report.images import MOST_BYTES, images
-from tyndall.lab.report.page import comparison, overview, page
+from tyndall.lab.report.page import ANCHORS, comparison, overview, page
 from tyndall.lab.report.results import FILE, read
 
 NAME = "report.html"
 
 
 def write_report(folder: str | os.PathLike[str]) -> Path:
-    """Write the report of a saved comparison, or of a folder whose sub-folders are saved comparisons.
+    """Write the report of a saved comparison, of a sweep, or of a folder whose sub-folders are saved comparisons.
 
     Returns:
         The path of the HTML file, ``folder/report.html``.
@@ -33,6 +34,27 @@ def write_report(folder: str | os.PathLike[str]) -> Path:
             written.
     """
     target = Path(folder)
+    text = _of_sweep(target) if _is_sweep(target) else _of_comparisons(target)
+    path = target / NAME
+
+    def write(place: Path) -> None:
+        place.write_bytes(text.encode("utf-8", errors="replace"))  # a name from a file may hold half a character
+
+    write_atomically(path, write)
+    return path
+
+
+def _is_sweep(folder: Path) -> bool:
+    return (folder / sweep.FILE).exists() and not (folder / FILE).exists()
+
+
+def _of_sweep(folder: Path) -> str:
+    name = folder.resolve().name
+    article = sweep.sweep(sweep.read_rows(folder), name)
+    return page(f"{name} – Tyndall", [(name, article)], {"s-plot0": "Plots", "s-table": "Points"})
+
+
+def _of_comparisons(target: Path) -> str:
     folders = [target]
     if target.is_dir() and not (target / FILE).exists():
         folders = sorted(path.parent for path in target.glob(f"*/{FILE}")) or folders
@@ -44,14 +66,7 @@ def write_report(folder: str | os.PathLike[str]) -> Path:
         for number, study in enumerate(studies)
     ]  # fmt: skip
     title = f"{len(studies)} comparisons" if several else studies[0].scene
-    text = page(f"{title} – Tyndall", parts, overview(studies) if several else None)
-    path = target / NAME
-
-    def write(place: Path) -> None:
-        place.write_bytes(text.encode("utf-8", errors="replace"))  # a name from a file may hold half a character
-
-    write_atomically(path, write)
-    return path
+    return page(f"{title} – Tyndall", parts, ANCHORS, overview(studies) if several else None)
 
 
 __all__ = ["NAME", "OutputError", "write_report"]

@@ -103,8 +103,9 @@ function setUpChoice() {
   show(known(fromAddress()));
   which?.addEventListener("change", () => show(which.value));
   addEventListener("hashchange", () => { if (fromAddress()) show(known(fromAddress())); });
-  addEventListener("beforeprint", () => document.querySelectorAll("details").forEach((d) => { d.open = true; }));
 }
 
 setUpTheme();
-setUpChoice();
+if (document.querySelector(".comparison")) setUpChoice();
+document.querySelectorAll(".sweep").forEach(setUpSweep);
+addEventListener("beforeprint", () => document.querySelectorAll("details").forEach((d) => { d.open = true; }));

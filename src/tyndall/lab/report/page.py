@@ -16,26 +16,35 @@ from tyndall.lab.report.markup import Html, data, join, tag
 from tyndall.lab.report.results import Milliseconds, Result, Study
 from tyndall.lab.report.table import COLOURS, figure, scroll, table
 
+ANCHORS = {
+    "pictures": "Pictures",
+    "errors": "Errors",
+    "crops": "Close-ups",
+    "cost": "Cost",
+    "table": "Figures",
+    "setup": "Setup",
+}  # of a comparison
 _LONG = 44  # characters; a longer fact has two columns
 _SHORT = {"inscattered": "air", "surfaces": "surfaces", "radiance": "whole"}
-_SCRIPTS = ("base.js", "light.js", "viewer.js", "maps.js", "crops.js", "plots.js", "main.js")
+_SCRIPTS = ("base.js", "light.js", "viewer.js", "maps.js", "crops.js", "plots.js", "sweep.js", "main.js")
 
 
-def page(title: str, parts: Sequence[tuple[str, Html]], overview: Html | None = None) -> str:
+def page(
+    title: str, parts: Sequence[tuple[str, Html]], anchors: Mapping[str, str], overview: Html | None = None
+) -> str:
     """The whole file.
 
     Args:
         title: of the page.
-        parts: one or more comparisons, by name; of several, a selector shows one at a time.
+        parts: one or more articles, by name; of several, a selector shows one at a time.
+        anchors: where the bar leads inside an article: what it says, by the end of the section's id.
         overview: what stands before them.
     """
     selector = None
     if len(parts) > 1:
         options = [tag("option", name, value=f"c{i}") for i, (name, _) in enumerate(parts)]
         selector = tag("label", tag("span", "Scene"), tag("select", *options, id="which"), class_="which script")
-    anchors = {"pictures": "Pictures", "errors": "Errors", "crops": "Close-ups", "cost": "Cost", "table": "Figures",
-               "setup": "Setup"}  # fmt: skip
-    links = [tag("a", text, href=f"#c0-{name}", data_anchor=name) for name, text in anchors.items()]
+    links = [tag("a", text, href=f"#{name}", data_anchor=name) for name, text in anchors.items()]
     links.append(tag("a", "Glossary", href="#glossary"))
     body = join(
         tag("header", tag("span", "Tyndall", class_="brand"), selector, tag("nav", *links, aria_label="Parts"),

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from tyndall.lab.report.results import Result, Study
 
@@ -158,8 +159,12 @@ class Judged:
 
 
 def judged_error(result: Result, kind: str, key: str) -> Judged | None:
-    """A relative error of a technique; None where it was not measured."""
-    scores = result.errors.get(kind, {})
+    """An error of a technique; None where it was not measured."""
+    return judged(result.errors.get(kind, {}), key)
+
+
+def judged(scores: Mapping[str, Any], key: str) -> Judged | None:
+    """One of the figures of :mod:`tyndall.lab.metrics`; None where it does not exist."""
     value, limit = scores.get(key), scores.get("rel_rmse_limit")
     if value is None:
         return None
@@ -170,25 +175,25 @@ def judged_error(result: Result, kind: str, key: str) -> Judged | None:
 
 def best(study: Study) -> list[str]:
     """The labels on the Pareto front of GPU time and error."""
-    judged = main_metric(study)
-    if judged is None:
+    main = main_metric(study)
+    if main is None:
         return []
-    errors = {r.label: judged_error(r, *judged) for r in study.results if r.technique != BASELINE}
+    errors = {r.label: judged_error(r, *main) for r in study.results if r.technique != BASELINE}
     times = {r.label: r.gpu_ms.median for r in study.results if r.gpu_ms}
     return front((label, times[label], e.rank) for label, e in errors.items() if e and label in times)
 
 
 def verdict(study: Study) -> str:
     """One sentence: who is on the Pareto front of time and error, with the figures."""
-    judged = main_metric(study)
+    main = main_metric(study)
     candidates = [r for r in study.results if r.technique != BASELINE]
     timed = {r.label: r.gpu_ms.median for r in candidates if r.gpu_ms}
-    if judged is None:
+    if main is None:
         if not timed:
             return "Neither errors nor times: no truth was asked for, and this adapter cannot time what it draws."
         label = min(timed, key=timed.__getitem__)
         return f"{label} is the fastest ({milliseconds(timed[label])}). No truth was asked for, so there are no errors."
-    errors = {r.label: e for r in candidates if (e := judged_error(r, *judged))}
+    errors = {r.label: e for r in candidates if (e := judged_error(r, *main))}
     if not errors:
         return "No technique’s error could be measured."
     if not timed:
@@ -207,10 +212,10 @@ def verdict(study: Study) -> str:
 
 def remarks(study: Study) -> list[str]:
     """What else the figures say: who loses to whom, what the truth’s noise hides, and what a factor would mend."""
-    judged = main_metric(study)
-    if judged is None:
+    main = main_metric(study)
+    if main is None:
         return []
-    kind, key = judged
+    kind, key = main
     errors = {r.label: e for r in study.results if (e := judged_error(r, kind, key))}
     candidates = {r.label: r.gpu_ms.median for r in study.results if r.gpu_ms and r.technique != BASELINE}
     names, text = best(study), []
