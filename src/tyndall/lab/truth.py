@@ -276,27 +276,25 @@ def _converge(
         tracer.pilot(number, _affordable(settings, room))
     else:
         tracer.even(max(1, room // BATCHES))
-    count, check_at = 0, BATCHES
+    count, check_at, share = 0, BATCHES, 0.0
     while count < 2 or (count + 1) * tracer.samples <= room:
         elapsed = time.monotonic() - begin
         if settings.seconds and elapsed > settings.seconds and count >= 2:
             break
         tracer.batch(number + count)
         count += 1
-        if count < check_at:
-            if progress:
-                progress(0.5 * count / BATCHES)
-            continue
-        level = tracer.level()
-        level = known.pooled(level) if known else level
-        if level.error <= settings.target:
-            break
-        check_at = count + max(1, count // 8)
+        if count >= check_at:
+            level = tracer.level()
+            level = known.pooled(level) if known else level
+            if level.error <= settings.target:
+                break
+            check_at = count + max(1, count // 8)
+            share = max(share, (settings.target / level.error) ** 2)
         if progress:
-            shares = [(settings.target / level.error) ** 2, level.samples / settings.samples]
-            if settings.seconds:
-                shares.append(elapsed / settings.seconds)
-            progress(min(1.0, max(0.5, *shares)))
+            first, all_samples = 0.5 * min(count / BATCHES, 1.0), count * tracer.samples / room
+            timed = elapsed / settings.seconds if settings.seconds else 0.0
+            share = min(1.0, max(share, first, all_samples, timed))
+            progress(share)
     found = dataclasses.replace(tracer.result(), seconds=time.monotonic() - begin)
     if progress:
         progress(1.0)

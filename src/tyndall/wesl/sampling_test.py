@@ -39,6 +39,19 @@ def test_every_stratum_holds_one_point(gpu: Gpu, dimension: int, seed: int) -> N
             assert sorted(boxes) == list(range(2**k)), (k, a)
 
 
+def test_places_within_strata_are_independent(gpu: Gpu) -> None:
+    """Over seeds, where a point lies in its stratum says nothing of where the others lie in theirs."""
+    seeds, count = 1000, 64
+    rows = np.zeros((seeds * count, 4))
+    rows[:, 0], rows[:, 2] = np.tile(np.arange(count), seeds), np.repeat(np.arange(seeds), count)
+    points = props.evaluate(gpu, "test_strata", SEQUENCE, rows)[:, :3].astype(float).reshape(seeds, count, 3)
+    for axis in range(3):
+        places = np.sort(points[:, :, axis], axis=1) * count - np.arange(count)
+        assert np.abs(places.mean(axis=0) - 0.5).max() < 4.5 / np.sqrt(12 * seeds)
+        table = np.corrcoef(places.T) - np.eye(count)
+        assert np.abs(table).max() < 5.5 / np.sqrt(seeds)
+
+
 def test_a_smooth_integral_converges_faster_than_at_random(gpu: Gpu) -> None:
     """∫ sin²(3x) e^y over the unit square with 1024 points of eight scramblings."""
     exact = (0.5 - np.sin(6) / 12) * (np.e - 1)
