@@ -115,6 +115,7 @@ def sweep(
         ParameterError: a number of workers below 0, no such scheduler, or a library that is missing.
         OutputError: the folder cannot be written, or another sweep writes there; or it is full: what was measured
             before that is kept.
+        SchedulerError: the scheduler ended during the sweep; likewise.
     """
     if workers < 0 or isinstance(workers, bool):
         raise ParameterError(f"workers: {workers} is fewer than 0")
@@ -177,8 +178,9 @@ def _beginning(plan: Plan, store: Store, known: int, fresh: bool) -> list[str]:
 def _ending(rows: Sequence[Row]) -> list[str]:
     notes = []
     for name, text in (("failed", "could not be measured"), ("unsupported", "cannot be drawn")):
-        if count := sum(1 for row in rows if row["status"] == name):
-            notes.append(f"{count} point{'s' * (count != 1)} {text}; the rows say why")
+        if own := [row["reason"] for row in rows if row["status"] == name]:
+            others = f"; and {len(set(own)) - 1} other reasons" if len(set(own)) > 1 else ""
+            notes.append(f"{len(own)} point{'s' * (len(own) != 1)} {text}: {own[0]}{others}")
     for name, words in (("adapter", "adapters"), ("driver", "drivers")):
         found = dict.fromkeys(row[name] for row in rows if row.get(name))
         if len(found) > 1:

@@ -12,7 +12,6 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 _MEASURING = frozenset({"frames", "warmup", "seconds", "seed", "metrics"})
-_MOST_REASON = 60
 
 
 def table(rows: Sequence[Mapping[str, Any]], notes: Sequence[str] = ()) -> Table:
@@ -32,7 +31,7 @@ def table(rows: Sequence[Mapping[str, Any]], notes: Sequence[str] = ()) -> Table
         made.add_column(heading, justify="right", no_wrap=True)
     for row, point in zip(rows, points, strict=True):
         own = [_text(point.get(name)) for name in varied]
-        made.add_row(*own, *(_figures(row) if row["status"] == "done" else _reason(row)))
+        made.add_row(*own, *(_figures(row) if row["status"] == "done" else [row["status"], *7 * ["–"]]))
     return made
 
 
@@ -67,11 +66,6 @@ def _figures(row: Mapping[str, Any]) -> list[str]:
         "–" if error is None else f"{100 * error:.2f} %",
         "–" if light.get("bias") is None else f"{100 * light['bias']:+.2f} %",
     ]
-
-
-def _reason(row: Mapping[str, Any]) -> list[str]:
-    reason = str(row["reason"])
-    return [row["status"], *6 * ["–"], reason if len(reason) <= _MOST_REASON else f"{reason[:_MOST_REASON]}…"]
 
 
 def _ms(value: float | None) -> str:

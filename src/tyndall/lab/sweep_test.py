@@ -184,7 +184,7 @@ def test_a_worker_that_dies_is_tried_once_more_and_then_reported(workers: int, t
     assert failed["reason"] == "the worker died (signal 9)"
     assert failed["attempts"] == 2
     assert measured(log) == {1: 2, 2: 2, 3: 2, 4: 1, 5: 1}
-    assert "1 point could not be measured; the rows say why" in found.notes
+    assert "1 point could not be measured: the worker died (signal 9)" in found.notes
     assert "the worker died (signal 9)" in str(found)
     again = sweep(spec([1, 2, 3, 4, 5]), tmp_path, workers=0, work=sweep_work.quick)
     assert (again.failed, again.reused) == ([], 4)

@@ -15,6 +15,7 @@ import asyncio
 import contextlib
 import itertools
 import json
+import logging
 import os
 import subprocess
 import sys
@@ -41,6 +42,10 @@ _DASK = "from tyndall.lab.sweep_workers import serve; serve()"
 
 class Died(Exception):  # noqa: N818 - an event, which whoever asked deals with
     """A worker is no more; the message says how it ended."""
+
+
+class SchedulerError(RuntimeError):
+    """A Dask scheduler that was there is no more. One line."""
 
 
 class Worker(ABC):
@@ -283,6 +288,7 @@ class _RemoteWorker(_DaskWorker):
         return address in self._cluster.addresses()
 
     def bury(self, address: str) -> str:
+        self._cluster.addresses()  # where the scheduler itself is gone, no worker is to blame
         self._cluster.taken.discard(address)
         self._address = None
         return f"{address} is gone"
@@ -291,14 +297,22 @@ class _RemoteWorker(_DaskWorker):
 class _Remote:
     """The workers of a scheduler that exists."""
 
-    def __init__(self, client: Any) -> None:
-        self.client = client
+    def __init__(self, client: Any, address: str) -> None:
+        self.client, self._address = client, address
         self.taken: set[str] = set()
         self._lock = threading.Lock()
 
     def addresses(self) -> list[str]:
-        """Of the workers that are there now."""
-        return list(self.client.scheduler_info(n_workers=-1)["workers"])
+        """Of the workers that are there now.
+
+        Raises:
+            SchedulerError: there is nobody to tell.
+        """
+        with contextlib.suppress(OSError, ValueError):
+            known = self.client.scheduler_info(n_workers=-1).get("workers")
+            if known is not None and self.client.status == "running":
+                return list(known)
+        raise SchedulerError(f"scheduler: {self._address} does not answer any more; what was measured is kept")
 
     def take(self) -> str | None:
         """An address that nobody has."""
@@ -365,25 +379,26 @@ def remote_workers(address: str) -> Iterator[list[tuple[Worker, int]]]:
     import distributed
 
     parts: Any = distributed  # whose constructors have no types
-    try:
-        client = parts.Client(address, timeout=_CONNECT_S, set_as_default=False)
-    except (OSError, ValueError, TypeError) as error:
-        raise ParameterError(f"scheduler: no Dask scheduler answers at {address}") from error
-    with client:
-        remote = _Remote(client)
+    with contextlib.ExitStack() as stack:
+        log = logging.getLogger("distributed.client")
+        stack.callback(log.setLevel, log.level)
+        log.setLevel(logging.CRITICAL + 1)  # what it reports of a lost scheduler is told by us, in a line
+        try:
+            client = stack.enter_context(parts.Client(address, timeout=_CONNECT_S, set_as_default=False))
+        except (OSError, ValueError, TypeError) as error:
+            raise ParameterError(f"scheduler: no Dask scheduler answers at {address}") from error
+        remote = _Remote(client, address)
         hosts: Counter[str] = Counter()
         workers: list[tuple[Worker, int]] = []
         while (one := remote.take()) is not None:
             host = one.rpartition("//")[2].rpartition(":")[0]
-            workers.append((_RemoteWorker(remote, one), hosts[host]))
+            worker = _RemoteWorker(remote, one)
+            stack.callback(worker.end)
+            workers.append((worker, hosts[host]))
             hosts[host] += 1
         if not workers:
             raise ParameterError(f"scheduler: {address} has no workers")
-        try:
-            yield workers
-        finally:
-            for worker, _ in workers:
-                worker.end()
+        yield workers
 
 
 def serve() -> None:
