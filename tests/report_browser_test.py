@@ -47,6 +47,11 @@ UNNAMED = """() => {
   return [...document.querySelectorAll(all)]
     .filter((e) => !(e.getAttribute("aria-label") || labelled(e) || labels(e) || own(e))).map((e) => e.outerHTML);
 }"""
+SETTLED = """async () => {
+  const frame = () => new Promise((done) => requestAnimationFrame(done));
+  const busy = () => document.querySelector('[aria-busy="true"]');
+  do { await frame(); await frame(); await new Promise((done) => setTimeout(done, 30)); } while (busy());
+}"""
 COLOURS = """() => {
   const probe = document.body.appendChild(document.createElement("i"));
   const marks = Array.from({ length: 8 }, (_, i) => `k${i}`);
@@ -92,10 +97,8 @@ class Opened:
         self.settle()
 
     def settle(self) -> None:
-        """Wait until what was set in motion has been drawn."""
-        self.tab.evaluate(
-            "() => new Promise((r) => requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(r, 60))))"
-        )
+        """Wait until what was set in motion has been decoded and drawn."""
+        self.tab.evaluate(SETTLED)
 
     def pixels(self, selector: str = ".stage canvas") -> np.ndarray[Any, Any]:
         """(H, W, 3) of a canvas."""

@@ -27,11 +27,8 @@ function setUpCrops(article, study, state, gallery) {
       const where = `${w}×${h} pixels at (${x}, ${y})`;
       heading.replaceChildren(index < study.places.length ? `Place ${index + 1} ` : "Your place ", make("small", {}, where));
       cells.forEach(({ canvas }, i) => {
-        const context = canvas.getContext("2d"), source = gallery.get(i, show);
         canvas.setAttribute("aria-label", `${study.pictures[i]}, ${where}${show === "picture" ? "" : ", error"}`);
-        context.fillStyle = shared.palette[0];
-        context.fillRect(0, 0, w, h);
-        if (source && (source.complete ?? true)) context.drawImage(source, x, y, w, h, 0, 0, w, h);
+        gallery.part(i, show, [x, y, w, h], canvas);
       });
     });
   }

@@ -57,7 +57,7 @@ class Scale:
         span = math.log10(self.high / self.low)
         first, last = math.ceil(math.log10(self.low) - 1e-9), math.floor(math.log10(self.high) + 1e-9)
         values = [10.0**power for power in range(first, last + 1)]
-        if math.log10(self.high / values[-1]) > 0.12 * span:
+        if math.log10(self.high / values[-1]) > 0.2 * span:
             values.append(self.high)
         return [(value, math.log10(value / self.low) / span) for value in values]
 

@@ -80,6 +80,7 @@ def test_one_scale_spans_the_best_and_the_worst() -> None:
     scale = Scale.over([good, bad])
     assert (scale.low, scale.high) == (pytest.approx(1e-2), 5.0)
     assert [value for value, _ in scale.ticks()] == pytest.approx([0.01, 0.1, 1, 5])
+    assert [value for value, _ in Scale(0.01, 2.0).ticks()] == pytest.approx([0.01, 0.1, 1]), "no two on one another"
     assert all(0 <= place <= 1 for _, place in scale.ticks())
 
 

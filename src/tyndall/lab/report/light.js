@@ -73,26 +73,24 @@ const TONES = {
   },
 };
 
-/** A canvas with a picture's light at an exposure in EV. */
-function develop(codes, width, height, exposure, tone, canvas = make("canvas")) {
-  canvas.width = width;
-  canvas.height = height;
-  const context = canvas.getContext("2d");
-  const picture = context.createImageData(width, height);
+/** Draw a part (x, y, w, h) of a picture's light at an exposure in EV into a canvas of that size. */
+function develop(codes, width, [x, y, w, h], exposure, tone, canvas) {
+  const context = canvas.getContext("2d"), picture = context.createImageData(w, h);
   const out = picture.data, curve = TONES[tone] ?? TONES.aces;
   const exposed = lightOfCode.map((light) => light * 2 ** exposure);
-  for (let i = 0, at = 0; i < codes.length; i += 3, at += 4) {
-    curve(exposed[codes[i]], exposed[codes[i + 1]], exposed[codes[i + 2]], out, at);
-    out[at + 3] = 255;
+  for (let row = 0, at = 0; row < h; row++) {
+    for (let i = 3 * ((y + row) * width + x), end = i + 3 * w; i < end; i += 3, at += 4) {
+      curve(exposed[codes[i]], exposed[codes[i + 1]], exposed[codes[i + 2]], out, at);
+      out[at + 3] = 255;
+    }
   }
   context.putImageData(picture, 0, 0);
-  return canvas;
 }
 
 /**
- * The pictures and error maps of a comparison as things that can be drawn.
+ * The pictures and error maps of a comparison, ready to be drawn.
  *
- * `get(index, show)` is what there is now, and when something better is ready, `arrived` is called.
+ * What is there now is used at once; when something better is ready, `arrived` is called.
  */
 function makeGallery(article, study, state, arrived) {
   const [width, height] = study.size;
@@ -101,40 +99,54 @@ function makeGallery(article, study, state, arrived) {
   const codes = new Map(), developed = new Map();
   const able = study.light && typeof DecompressionStream !== "undefined";
 
-  function request(index) {
-    if (codes.has(index)) return;
+  /** A picture's light, or null until it is decoded. */
+  function lightOf(index) {
+    if (!able) return null;
+    if (codes.has(index)) return codes.get(index);
     codes.set(index, null);
     const block = document.getElementById(`${article.id}-light-${index}`);
     decodeLight(block.textContent, width, height).then((found) => {
       codes.set(index, found);
       arrived();
     }, (error) => console.error(`picture ${index} cannot be decoded: ${error}`));
+    return null;
   }
 
-  function light(index) {
-    request(index);
-    const found = codes.get(index);
-    if (!found) return images[index];
-    const { exposure, tone } = state.values;
-    const name = `${exposure} ${tone}`;
-    const old = developed.get(index);
-    if (old?.name === name) return old.canvas;
-    const canvas = develop(found, width, height, study.exposure + exposure, tone, old?.canvas);
-    developed.set(index, { name, canvas });
-    return canvas;
+  const exposure = () => study.exposure + state.values.exposure;
+  const loaded = (image) => (image?.complete ? image : null);
+
+  /** A whole picture in 8 bits as a canvas or image, or null. */
+  function whole(index, show) {
+    if (show !== "picture") return loaded(findMap(article, show, study.pictures[index]));
+    const light = lightOf(index);
+    if (!light) return loaded(images[index]);
+    const name = `${exposure()} ${state.values.tone}`;
+    const found = developed.get(index) ?? { canvas: make("canvas", { width, height }) };
+    if (found.name !== name) develop(light, width, [0, 0, width, height], exposure(), state.values.tone, found.canvas);
+    developed.set(index, { ...found, name });
+    return found.canvas;
   }
 
   return {
-    able,
-    get(index, show) {
-      if (show !== "picture") return findMap(article, show, study.pictures[index]);
-      return able ? light(index) : images[index];
+    whole,
+    /** Whether light is still being decoded. */
+    busy: () => [...codes.values()].includes(null),
+    /** Draw a part (x, y, w, h) of a picture into a canvas of that size: of a large picture no more than that is developed. */
+    part(index, show, place, canvas) {
+      const light = show === "picture" ? lightOf(index) : null;
+      if (light) {
+        develop(light, width, place, exposure(), state.values.tone, canvas);
+        return;
+      }
+      const [, , w, h] = place, context = canvas.getContext("2d"), source = whole(index, show);
+      context.fillStyle = shared.palette[0];
+      context.fillRect(0, 0, w, h);
+      if (source) context.drawImage(source, ...place, 0, 0, w, h);
     },
     /** Linear light at a pixel, or null. */
     at(index, x, y) {
-      const found = codes.get(index);
-      if (!found) return null;
-      return [0, 1, 2].map((c) => lightOfCode[found[3 * (y * width + x) + c]]);
+      const light = codes.get(index);
+      return light ? [0, 1, 2].map((c) => lightOfCode[light[3 * (y * width + x) + c]]) : null;
     },
   };
 }

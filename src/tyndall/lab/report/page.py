@@ -13,7 +13,7 @@ from tyndall.lab.report import verdict
 from tyndall.lab.report.heat import colour_map
 from tyndall.lab.report.images import TRUTH, Images
 from tyndall.lab.report.markup import Html, data, join, tag
-from tyndall.lab.report.results import Milliseconds, Result, Study
+from tyndall.lab.report.results import Milliseconds, Reference, Result, Study
 from tyndall.lab.report.table import COLOURS, figure, scroll, table
 
 ANCHORS = {
@@ -130,11 +130,11 @@ def _head(study: Study, heading: str) -> Html:
     if study.triangles is not None:
         facts.insert(1, ("Triangles", f"{study.triangles:,}"))
     if truth:
-        facts.append(("Truth", truth.judge + (f", {truth.samples:,} samples per pixel" if truth.samples else "")))
+        facts.append(("Truth", ", ".join([truth.judge, *_effort(truth)])))
         facts += [
             (f"Its standard error, {verdict.kind_name(kind)}", verdict.percent(noise))
             for kind, noise in truth.relative_error.items()
-            if noise is not None
+            if noise
         ]
     else:
         facts.append(("Truth", "none was asked for"))
@@ -206,6 +206,7 @@ def _pictures(study: Study, images: Images, prefix: str) -> Html:
         tag("div", tag("span"), role="slider", tabindex=0, data_role="divider", class_="divider",
             aria_label="Divider between the left and the right picture", aria_valuemin=0, aria_valuemax=100,
             aria_valuenow=50, aria_orientation="horizontal"),
+        tag("span", tag("span"), tag("i"), tag("span"), data_role="scale", class_="scale", hidden=True),
         tag("span", "Click the picture first, then the wheel zooms", data_role="hint", class_="hint", hidden=True),
         tabindex=0, role="group", data_role="stage", class_="stage script", aria_describedby=f"{prefix}-keys",
         aria_label="Picture under a divider; keys: plus and minus zoom, arrows move, numbers choose the left picture",
@@ -414,14 +415,13 @@ def _setup(study: Study, prefix: str) -> Html:
     if study.reference:
         known = study.reference
         pairs: list[tuple[str, str | Html]] = [("Judge", known.judge)]
-        if known.samples:
-            pairs.append(("Samples per pixel", f"{known.samples:,}"))
+        pairs += [("Effort", text) for text in _effort(known)]
         if known.seconds is not None:
             pairs.append(("Time", f"{verdict.significant(known.seconds, 3)} s"))
         pairs += [
             (f"Standard error, {verdict.kind_name(kind)}", verdict.percent(noise))
             for kind, noise in known.relative_error.items()
-            if noise is not None
+            if noise
         ]
         pairs += [(key.replace("_", " "), _value(value)) for key, value in known.other.items()]
         truth = join(tag("h3", "Truth"), _list(pairs, "facts"))
@@ -451,6 +451,13 @@ def _setup(study: Study, prefix: str) -> Html:
         id=f"{prefix}-setup",
         class_="setup",
     )
+
+
+def _effort(truth: Reference) -> list[str]:
+    """How much work a truth is, in words: a march has steps, everything else samples."""
+    if "steps" in truth.other:
+        return [f"{truth.other['steps']} steps a pixel"]
+    return [f"{truth.samples:,} samples a pixel"] if truth.samples else []
 
 
 def _parameters(name: str, value: Any) -> Html:

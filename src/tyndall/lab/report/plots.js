@@ -229,7 +229,7 @@ function setUpBars(article, study, role, unit, parts, text) {
         const owned = found.filter((p) => p[2]).length;
         // A technique's own parts are shades of its colour, told apart by their edges too; the rest is grey.
         const shade = owned > 1 ? 100 - (45 * n) / Math.max(1, owned - 1) : 100;
-        const colour = own ? `color-mix(in oklab, ${colourOf(index)} ${shade}%, var(--paper))` : "var(--line)";
+        const colour = own ? `color-mix(in oklab, ${colourOf(index)} ${shade}%, var(--paper))` : "color-mix(in oklab, var(--edge) 55%, var(--paper))";
         const share = `${result.label}: ${label}, ${text(value)}`;
         const tell = () => { legend.textContent = share; };
         group.append(draw("rect", { class: "part", x: at(from), y: y + 5, width: Math.max(1, at(from + value) - at(from)), height: line - 12, fill: colour,

@@ -36,6 +36,7 @@ function setUpViewer(article, study, state, gallery) {
     const middle = Math.round(split * pixels[0]);
     paintHalf(left, 0, middle);
     paintHalf(right, middle, pixels[0] - middle);
+    stage.setAttribute("aria-busy", gallery.busy());
     if (state.values.frames) paintPlaces(x * ratio, y * ratio, s);
     divider.style.left = `${100 * split}%`;
     divider.setAttribute("aria-valuenow", Math.round(100 * split));
@@ -49,8 +50,8 @@ function setUpViewer(article, study, state, gallery) {
       context.clip();
       context.imageSmoothingEnabled = s < 1;
       context.imageSmoothingQuality = "high";
-      const source = gallery.get(index, show);
-      if (source && (source.complete ?? true)) context.drawImage(source, x * ratio, y * ratio, width * s, height * s);
+      const source = gallery.whole(index, show);
+      if (source) context.drawImage(source, x * ratio, y * ratio, width * s, height * s);
       else if (show !== "picture") {
         context.fillStyle = shared.palette[0];
         context.fillRect(x * ratio, y * ratio, width * s, height * s);
@@ -84,6 +85,9 @@ function setUpViewer(article, study, state, gallery) {
     const kind = show === "picture" ? "" : `, error of the ${shared.kinds[show] ?? show}`;
     part("name-left").textContent = names[0];
     part("name-right").textContent = names[1];
+    const scale = study.maps[show];
+    part("scale").hidden = !scale;
+    if (scale) part("scale").querySelectorAll("span").forEach((end, i) => { end.textContent = percent([scale.low, scale.high][i]); });
     canvas.setAttribute("aria-label", `${study.scene}: ${names[0]} on the left, ${names[1]} on the right${kind}`);
     part("left").value = left;
     part("right").value = right;
@@ -276,7 +280,8 @@ function setUpViewer(article, study, state, gallery) {
       const errors = Object.entries(study.maps).map(([kind, scale]) => {
         const map = findMap(article, kind, study.pictures[index]);
         const number = map ? colourAt(map, ...probe) : null;
-        return number === null ? null : `error of the ${shared.kinds[kind] ?? kind} ${errorText(scale, number)}`;
+        const what = study.pictures[index] === TRUTH ? "standard error" : "error";
+        return number === null ? null : `${what} of the ${shared.kinds[kind] ?? kind} ${errorText(scale, number)}`;
       });
       const words = [light && `radiance ${light.map((v) => significant(v, 2)).join(", ")}`, ...errors].filter(Boolean);
       return [make("b", {}, study.pictures[index]), ` ${words.join(" · ")}`];
@@ -284,6 +289,7 @@ function setUpViewer(article, study, state, gallery) {
     line.replaceChildren(`pixel ${probe.join(", ")} `, make("br"), ...values[0], make("br"), ...values[1]);
   });
 
+  part("scale").querySelector("i").style.background = rampOfColours();
   refresh();
 }
 
