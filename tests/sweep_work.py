@@ -28,6 +28,7 @@ def _log(task: Mapping[str, Any]) -> int:
     path = Path(os.environ["SWEEP_LOG"])
     with path.open("a", encoding="utf-8") as file:
         file.write(f"{height}\n")
+    path.with_suffix(f".{os.getpid()}").touch()
     return path.read_text(encoding="utf-8").split().count(height)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,8 @@ import props
 import pytest
 
 from tyndall.frame import Renderer
-from tyndall.gpu.device import Gpu, GpuError, adapters, choose_adapter
+from tyndall.gpu import device
+from tyndall.gpu.device import Gpu, GpuError, adapters, choose_adapter, choose_adapters
 from tyndall.gpu.resources import BYTES_PER_TEXEL, texel_dtype
 from tyndall.scene.model import DirectionalLight, Medium, PointLight, Scene
 from tyndall.techniques import FAMILIES
@@ -201,6 +203,25 @@ def test_a_failed_pass_does_not_poison_the_next(gpu: Gpu) -> None:
         with pytest.raises(RuntimeError, match="broken"):
             renderer.draw()
     assert props.shoot(gpu, LIT_WALL).base.max() > 0.1
+
+
+def test_processes_share_a_machine_s_adapters_by_their_rank(monkeypatch: pytest.MonkeyPatch) -> None:
+    def adapter(name: str, number: int) -> Any:
+        kind = {"device": name, "vendor": "v", "backend_type": "Vulkan", "adapter_type": "DiscreteGPU"}
+        return SimpleNamespace(info=kind, number=number)
+
+    found = [adapter("A", 0), adapter("B", 1), adapter("A", 2), adapter("A", 3)]
+    monkeypatch.setattr(device, "adapters", lambda: found)
+    monkeypatch.delenv("TYNDALL_ADAPTER", raising=False)
+    assert [a.number for a in choose_adapters()] == [0, 2, 3]
+    assert [a.number for a in choose_adapters("b")] == [1]
+
+
+def test_a_rank_counts_around(gpu: Gpu) -> None:
+    count = len(choose_adapters(gpu.adapter_info["device"]))
+    with Gpu(gpu.adapter_info["device"], rank=count + gpu.rank) as other:
+        assert other.rank == gpu.rank
+        assert other.adapter_info["device"] == gpu.adapter_info["device"]
 
 
 def test_listing_adapters_leaves_the_environment_alone(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -28,18 +29,18 @@ def descriptions(spec: Any) -> list[dict[str, Any]]:
     return [point.description for point in plan(spec).points]
 
 
-def test_the_points_are_the_product_and_the_last_changes_fastest() -> None:
-    spec = {
-        "scenes": ["box", "blinds"],
-        "lights": [1, 2],
+def test_the_points_are_the_product_and_the_last_changes_fastest(tmp_path: Path) -> None:
+    save(Scene(lights=(DirectionalLight(),)), tmp_path / "room.json")
+    spec: dict[str, Any] = {
+        "parts": [{"scenes": "box", "lights": [1, 2]}, {"scenes": str(tmp_path / "room.json")}],
         "sizes": ["64x36", [32, 18]],
         "techniques": [{"technique": "froxel", "grid": GRIDS, "samples": [1, 2]}, "off"],
         "shadow": {"technique": "shadow_map", "size": [128, 256]},
     }
     found = descriptions(spec)
-    assert len(found) == 2 * 2 * 2 * 2 * (2 * 2 + 1)
-    assert [d["scene"] for d in found] == 40 * ["box"] + 40 * ["blinds"]
-    assert [d["lights"] for d in found[:40]] == 20 * [1] + 20 * [2]
+    assert len(found) == (2 + 1) * 2 * 2 * (2 * 2 + 1)
+    assert [Path(d["scene"]).name for d in found] == 40 * ["box"] + 20 * ["room.json"]
+    assert [d["lights"] for d in found] == 20 * [1] + 20 * [2] + 20 * [1]
     assert [d["size"] for d in found[:20]] == 10 * [[64, 36]] + 10 * [[32, 18]]
     assert [d["shadow"]["size"] for d in found[:10]] == 5 * [128] + 5 * [256]
     froxels = [(d["technique"]["grid"], d["technique"]["samples"]) for d in found[:4]]
@@ -198,6 +199,16 @@ def test_a_file_is_named_with_its_mistake(text: str, said: str, tmp_path: Path) 
         read(path)
     (line,) = error.value.mistakes
     assert line.startswith(f"{path}: {said}")
+
+
+def test_the_specification_in_the_documentation_is_right() -> None:
+    page = (Path(__file__).parents[3] / "docs" / "sweeps.md").read_text(encoding="utf-8")
+    block = re.search(r"```json\n(.*?)```", page, re.DOTALL)
+    assert block
+    spec = json.loads(block[1])
+    assert len(plan({**spec, "scenes": "box"}).points) == 3 * 2 * 2 * (3 + 4)
+    for name in sweep_spec._Record.model_fields:
+        assert f"`{name}`" in page
 
 
 def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import psutil
 import pytest
 import sweep_work
 
@@ -161,6 +162,9 @@ def test_a_killed_run_loses_a_point_a_worker_and_goes_on(workers: int, tmp_path:
         time.sleep(0.02)
     process.send_signal(signal.SIGKILL)
     process.communicate()
+    while any(psutil.pid_exists(int(path.suffix[1:])) for path in log.parent.glob("log.*")):
+        assert time.monotonic() < deadline, "workers end with their parent"
+        time.sleep(0.02)
     with Store(tmp_path / "out") as store:
         kept = set(heights(list(store.rows.values())))
     before = measured(log)
@@ -217,8 +221,6 @@ def test_a_scheduler_that_does_not_answer_is_one_line(tmp_path: Path, monkeypatc
 
 
 def test_a_sweep_listens_on_the_loopback_interface_alone() -> None:
-    import psutil
-
     from tyndall.lab.sweep_workers import local_workers
 
     with local_workers(1) as workers:
