@@ -229,7 +229,8 @@ def _render(
             for news in process.news(_SILENCE_S):
                 if progress and "errors" in news:
                     progress(_done(news, settings))
-        found = dict(np.load(folder / "result.npz"))
+        with np.load(folder / "result.npz") as result:
+            found = dict(result)
     made = {
         **dataclasses.asdict(settings),
         "variant": variant.name,

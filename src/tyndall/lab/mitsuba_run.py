@@ -236,7 +236,10 @@ class Tracer:
         self.scalar = mi.variant().startswith("scalar")
         self.culled = 0.0
         self._sights: dict[int, dict[str, Any]] = {}
-        images = dict(np.load(folder / "images.npz")) if (folder / "images.npz").exists() else {}
+        images: dict[str, NDArray[np.uint8]] = {}
+        if (folder / "images.npz").exists():
+            with np.load(folder / "images.npz") as file:
+                images = dict(file)
         medium = content["medium"]
         self.medium: Any = None
         self.air = Box(mi, dr, medium and medium["bounds"])

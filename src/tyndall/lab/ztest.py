@@ -68,7 +68,8 @@ def z_test(
     """Hold two pictures, or any arrays of one shape, against each other.
 
     Args:
-        a, b: means.
+        a, b: means. The channels of a picture's pixel, (H, W, channels), may come from the same samples: in the sum of
+            all differences, their errors add up as if they were one.
         a_error, b_error: their standard errors; 0 where a value is exact.
         significance: how often two equal pictures may be called different, 0 … 1.
         tolerance: a difference to be ignored, relative to the value; far below the errors, or the test is blunt.
@@ -87,7 +88,8 @@ def z_test(
     z = _divided(np.sign(difference) * np.maximum(0.0, np.abs(difference) - allowance), error)
     total = difference.sum()
     excess = np.sign(total) * max(0.0, abs(float(total)) - float(allowance.sum()))
-    bias = _divided(np.array(excess), np.array(np.sqrt(np.sum(error**2))))
+    independent = error.sum(axis=-1) if error.ndim == 3 else error
+    bias = _divided(np.array(excess), np.array(np.sqrt(np.sum(independent**2))))
     chance = 1 - (1 - significance) ** (1 / (difference.size + 1))
     where = np.unravel_index(int(np.abs(z).argmax()), z.shape)
     noisy = error > 0

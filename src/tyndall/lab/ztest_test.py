@@ -1,3 +1,5 @@
+import math
+
 import numpy as np
 import pytest
 
@@ -36,9 +38,16 @@ def test_one_pixel_that_is_off_is_found_and_named() -> None:
 def test_a_bias_too_small_for_any_pixel_is_found_in_the_sum() -> None:
     picture = 1 + 0.05 * noise(4)
     assert z_test(picture, np.ones_like(picture), 0.05)
-    found = z_test(picture * 1.01, np.ones_like(picture), 0.05)
+    found = z_test(picture * 1.02, np.ones_like(picture), 0.05)
     assert not found
     assert found.worst < found.critical < found.bias
+
+
+def test_channels_that_share_their_samples_are_one_in_the_sum() -> None:
+    grey = 1 + 0.05 * np.repeat(noise(7, (24, 24, 1)), 3, axis=2)
+    as_values, as_picture = (z_test(x, np.ones_like(x), 0.05, tolerance=0) for x in (grey.ravel(), grey))
+    assert as_values.bias == pytest.approx(math.sqrt(3) * as_picture.bias)
+    assert as_picture.bias == pytest.approx(24 * (grey.mean() - 1) / 0.05)
 
 
 def test_both_errors_count() -> None:
