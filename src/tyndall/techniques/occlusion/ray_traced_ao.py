@@ -29,7 +29,7 @@ class RayTracedAo(Technique):
 
     radius: float = param(1.0, 1e-6, None, "distance within which surfaces block the ambient light", unit="m")
     samples: int = param(1, 1, 256, "rays a pixel and frame")
-    fresh: int = param(8, 1, 64, "times as many rays where nothing is remembered")
+    fresh: int = param(8, 1, 64, "times as many rays, to 64, where nothing is remembered")
     history: int = param(32, 1, 2047, "frames that are remembered while the camera moves", unit="frame")
 
     def render(self, view: View) -> Occlusion:

@@ -45,15 +45,6 @@ def seen(scene: Scene) -> tuple[np.ndarray, props.Hit]:
     return rays.at(np.where(np.isfinite(hit.distance), hit.distance, 0)), hit
 
 
-@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
-@pytest.mark.parametrize("radius", [0.1, FAR])
-def test_a_plane_is_open(gpu: Gpu, scale: float, radius: float) -> None:
-    camera = replace(ABOVE, position=tuple(scale * x for x in ABOVE.position), target=(0, 0, 0), near=0.02 * scale)
-    scene = Scene([props.floor(0, 20 * scale)], camera=camera)
-    got = openness(gpu, scene, RayTracedAo(radius=radius * scale, samples=8, fresh=1), frames=1)
-    assert (got[np.isfinite(seen(scene)[1].distance)] == 1).all()
-
-
 def upright(x: float, height: float) -> Instance:
     """A wall that faces +x, very long."""
     return props.quad((x, 0, 200), (x, 0, -200), (x, height, -200), (x, height, 200))
@@ -76,7 +67,9 @@ def test_a_corner_of_two_planes_is_the_closed_form(gpu: Gpu, height: float, radi
     else:
         a = np.arccos(np.clip(x / radius, 0, 1))
         expected = 1 - (a - np.sin(a) * np.cos(a)) / math.pi
-    z = (got - expected)[floor] / np.sqrt(expected * (1 - expected) / (rays * frames) + 1e-6)[floor]
+    # The second term: where hardly anything is hidden, one ray more or less.
+    deviation = np.sqrt(expected * (1 - expected) / (rays * frames) + 1 / (rays * frames) ** 2)
+    z = ((got - expected) / deviation)[floor]
     assert floor.sum() > 600
     assert np.abs(z).max() < 4.5
     assert z.std() < 0.8, "the points must be more even than random ones"
@@ -90,18 +83,6 @@ def test_the_inside_of_a_closed_box_is_dark(gpu: Gpu) -> None:
     scene = Scene([room], camera=Camera((0.5, 0.5, 2.0), (0, 0, 0), fov=0.8, near=0.02))
     assert (openness(gpu, scene, RayTracedAo(radius=FAR, fresh=2), frames=2) == 0).all()
     assert openness(gpu, scene, RayTracedAo(radius=0.05), frames=2).mean() > 0.95
-
-
-def test_only_the_ambient_light_is_dimmed(gpu: Gpu) -> None:
-    material = replace(WHITE, emissive=(0.3, 0.1, 0.2))
-    shapes = [props.floor(0, 20, material), upright(-0.4, 1.0)]
-    lit = Scene(shapes, [DirectionalLight((-0.3, -1, -0.2), 2.0)], ABOVE, background=(0.2, 0.4, 0.8))
-    assert np.array_equal(draw(gpu, lit, RayTracedAo()), draw(gpu, lit, NoOcclusion()))
-    both = lit.with_(ambient=AMBIENT)
-    rest = draw(gpu, lit, NoOcclusion())
-    open_light, dimmed = draw(gpu, both, NoOcclusion()) - rest, draw(gpu, both, RayTracedAo(samples=16, fresh=1)) - rest
-    assert (dimmed <= open_light + 2e-3).all()
-    assert (dimmed < 0.8 * open_light)[..., 1].mean() > 0.1
 
 
 def test_the_mean_of_frames_is_that_of_their_rays(gpu: Gpu) -> None:

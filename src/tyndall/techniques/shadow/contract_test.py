@@ -12,6 +12,7 @@ import pytest
 from props import WHITE, shoot
 
 from tyndall.gpu.device import Gpu
+from tyndall.gpu.params import fields_of
 from tyndall.scene.model import (
     Camera,
     DirectionalLight,
@@ -242,6 +243,26 @@ def test_a_scene_without_lights_or_shapes_is_drawn(gpu: Gpu, name: str) -> None:
     begin, end = props.hit_box(seen.origin, seen.directions, (-1, -1, -1), (1, 1, 1))
     expected = props.lit_slab(empty, SIZE, np.where(end > begin, begin, 0), np.where(end > begin, end, 0), begin)
     np.testing.assert_allclose(got[..., 0], np.where(end > begin, expected[..., 0], 0), rtol=1e-3, atol=1e-5)
+
+
+def extremes() -> list[Any]:
+    found = []
+    for name, cls in FAMILY.members.items():
+        for f in fields_of(cls):
+            for value in (f.param.low, f.param.high):
+                small = "size" not in f.name or value == f.param.low  # the largest map is a gigabyte
+                if isinstance(value, (int, float)) and small:
+                    found.append(pytest.param(name, {f.name: f.type(value)}, id=f"{name}.{f.name}={value:g}"))
+    return found
+
+
+@pytest.mark.parametrize(("name", "changes"), extremes())
+def test_the_ends_of_every_range_draw_something(gpu: Gpu, name: str, changes: dict[str, Any]) -> None:
+    lights = [DirectionalLight((0.5, -1.0, -0.35), 3.0), PointLight((-1.2, 2.2, 0.9), 20.0, radius=0.1)]
+    scene = Scene([props.floor(0, 4), CUBE], lights, ABOVE)
+    base = shoot(gpu, scene, (24, 18), shadow=make(name, **changes), frames=2).base
+    assert np.isfinite(base).all()
+    assert base.mean() > 0.1
 
 
 CULLING = [("none", 0.99), ("back", 0.99), ("front", 0.985)]

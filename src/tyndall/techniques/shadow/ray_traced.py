@@ -41,7 +41,7 @@ class RayTraced(Technique):
     advice: ClassVar[str] = "Exact for any light, scene and scale, and soft where a light has a radius; costs rays."
 
     samples: int = param(1, 1, 256, "rays a pixel, frame and light with a radius")
-    fresh: int = param(8, 1, 64, "times as many rays where a soft shadow remembers nothing")
+    fresh: int = param(8, 1, 64, "times as many rays, to 64, where a soft shadow remembers nothing")
     history: int = param(32, 1, 2047, "frames that a soft shadow remembers while the camera moves", unit="frame")
     air: Literal["rays", "map"] = param("rays", doc="what answers for points in the air", rebuild=True)
     map_size: int = param(1024, 16, 16384, "width and height of a map, if maps are drawn", unit="texel", rebuild=True)

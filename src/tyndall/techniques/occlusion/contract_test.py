@@ -1,0 +1,79 @@
+"""What every occlusion technique must get right: open is open, and only the ambient light is dimmed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import props
+import pytest
+from props import WHITE
+
+from tyndall.frame import Renderer
+from tyndall.gpu.device import Gpu
+from tyndall.gpu.params import fields_of
+from tyndall.scene.model import Camera, DirectionalLight, Scene
+from tyndall.techniques import FAMILIES, Technique
+from tyndall.techniques.occlusion.none import NoOcclusion
+
+FAMILY = FAMILIES["occlusion"]
+ALL = tuple(FAMILY.members)
+SIZE = (48, 36)
+AMBIENT = (0.5, 1.0, 0.25)
+ABOVE = Camera((0.9, 1.1, 1.6), (0.2, 0, 0), fov=0.8, near=0.02)
+
+
+def draw(gpu: Gpu, scene: Scene, technique: str | Technique, frames: int = 1) -> np.ndarray:
+    others: dict[str, Any] = {"volumetric": "off", "antialiasing": "none", "tonemap": "none"}
+    with Renderer(scene, SIZE, gpu=gpu, occlusion=technique, **others) as renderer:
+        for _ in range(frames):
+            renderer.draw()
+        return renderer.base().astype(float)
+
+
+@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
+def test_a_plane_is_open(gpu: Gpu, name: str, scale: float) -> None:
+    """Exactly, from a scene of millimetres to one of kilometres."""
+    camera = replace(ABOVE, position=tuple(scale * x for x in ABOVE.position), target=(0, 0, 0), near=0.02 * scale)
+    scene = Scene([props.floor(0, 20 * scale)], camera=camera, ambient=AMBIENT)
+    rays = props.rays(camera, SIZE)
+    onto = np.isfinite(props.cast(scene, rays.origin, rays.directions).distance)
+    assert onto.mean() > 0.9
+    got = draw(gpu, scene, name)[onto]
+    np.testing.assert_allclose(got, np.broadcast_to(AMBIENT, got.shape), rtol=1e-3)
+    assert np.array_equal(got, draw(gpu, scene, NoOcclusion())[onto])
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_only_the_ambient_light_is_dimmed(gpu: Gpu, name: str) -> None:
+    """Not lights, emission or the background; and none of it is made brighter."""
+    glowing = replace(WHITE, emissive=(0.3, 0.1, 0.2))
+    wall = props.quad((-0.4, 0, 20), (-0.4, 0, -20), (-0.4, 1, -20), (-0.4, 1, 20))
+    shapes = [props.floor(0, 20, glowing), wall]
+    lit = Scene(shapes, [DirectionalLight((-0.3, -1, -0.2), 2.0)], ABOVE, background=(0.2, 0.4, 0.8))
+    rest = draw(gpu, lit, NoOcclusion())
+    assert np.array_equal(draw(gpu, lit, name, frames=2), rest)
+    both = lit.with_(ambient=AMBIENT)
+    assert (draw(gpu, both, name, frames=2) <= draw(gpu, both, NoOcclusion())).all()
+    assert (draw(gpu, both, name, frames=2) >= rest).all()
+
+
+def extremes() -> list[Any]:
+    found = []
+    for name, cls in FAMILY.members.items():
+        for f in fields_of(cls):
+            for value in (f.param.low, f.param.high):
+                if isinstance(value, (int, float)):
+                    found.append(pytest.param(name, {f.name: f.type(value)}, id=f"{name}.{f.name}={value:g}"))
+    return found
+
+
+@pytest.mark.parametrize(("name", "changes"), extremes())
+def test_the_ends_of_every_range_draw_something(gpu: Gpu, name: str, changes: dict[str, Any]) -> None:
+    wall = props.quad((-0.4, 0, 20), (-0.4, 0, -20), (-0.4, 1, -20), (-0.4, 1, 20))
+    scene = Scene([props.floor(0, 20), wall], camera=ABOVE, ambient=AMBIENT)
+    got = draw(gpu, scene, FAMILY.make(name, changes=changes), frames=2)
+    assert np.isfinite(got).all()
+    assert got.mean() > 0.1
