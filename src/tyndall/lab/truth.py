@@ -255,7 +255,7 @@ def _affordable(settings: TruthSettings, room: int) -> Callable[[_Level, float],
     def choose(pilot: _Level, seconds: float) -> int:
         # The plan itself takes most of the error away.
         gain = 0.25 * math.sqrt(_PILOT_BATCHES / BATCHES)
-        wanted = _PILOT_SAMPLES * gain * min(pilot.error / max(settings.target, 1e-6), 1e6)
+        wanted = pilot.samples / _PILOT_BATCHES * gain * min(pilot.error / max(settings.target, 1e-6), 1e6)
         most = room / BATCHES
         if settings.seconds:
             most = min(most, settings.seconds / max(seconds, 1e-9) / BATCHES)
@@ -272,11 +272,13 @@ def _converge(
     room = settings.samples - (before.samples if before else 0)
     # An earlier run's batches have numbers below its samples: no sequence is used twice.
     number = before.samples if before else 0
-    if room >= _WORTH_A_PILOT:
-        tracer.pilot(number, _affordable(settings, room))
-    else:
-        tracer.even(max(1, room // BATCHES))
     count, check_at, share = 0, BATCHES, 0.0
+    if room < _WORTH_A_PILOT:
+        tracer.even(max(1, room // BATCHES))
+    elif pilot := tracer.affordable_pilot(number, settings.seconds) if settings.seconds else _PILOT_SAMPLES:
+        tracer.pilot(number, pilot, _affordable(settings, room))
+    else:
+        count = 2
     while count < 2 or (count + 1) * tracer.samples <= room:
         elapsed = time.monotonic() - begin
         if settings.seconds and elapsed > settings.seconds and count >= 2:
@@ -425,25 +427,40 @@ class _Tracer(Closing):
         self._samples, self._job["stage"], self._job["batch_samples"] = float(samples), _EVEN, samples
         self._batches = 0
 
-    def pilot(self, number: int, choose: Callable[[_Level, float], int]) -> None:
+    def affordable_pilot(self, number: int, seconds: float) -> int:
+        """The samples of a pilot's batch that leave it two fifths of the time; 0 where even the smallest is too long.
+
+        Two batches of one sample tell: the first one compiles. They count where no pilot comes to forget them.
+        """
+        self.even(1)
+        self.batch(number)
+        self._gpu.wait()
+        begin = time.monotonic()
+        self.batch(number + 1)
+        self._gpu.wait()
+        each = _PILOT_BATCHES * (time.monotonic() - begin)
+        return next((samples for samples in (16, 8, 4, 2) if samples * each <= 0.6 * seconds), 0)
+
+    def pilot(self, number: int, samples: int, choose: Callable[[_Level, float], int]) -> None:
         """Find out where the lights are met and which pixels scatter, and plan the batches by it.
 
         What the pilot saw is then forgotten: the plan may depend on it, and a mean that held it would be biased.
 
         Args:
+            samples: of each of its batches; the more, the narrower the lights' places are known.
             choose: an ordinary pixel's samples of a batch, from the pilot's level and its seconds for each sample.
         """
         begin = time.monotonic()
-        self.even(_PILOT_SAMPLES)
+        self.even(samples)
         self._job["stage"] = _PILOT
+        self._job["slack"] = 2.05 / (_PILOT_BATCHES * samples)
         for k in range(_PILOT_BATCHES):
             # Parts of one sequence: what they leave between them is as even as it can be.
-            self._batch(_PILOT_NUMBERS + number, k * _PILOT_SAMPLES, (k + 1) * _PILOT_SAMPLES)
+            self._batch(_PILOT_NUMBERS + number, k * samples, (k + 1) * samples)
         level = self.level()
         seconds = (time.monotonic() - begin) / level.samples
-        samples = choose(level, seconds)
         self._job["square"] = max(self._squares, 1e-37)
-        self._job["batch_samples"] = samples
+        self._job["batch_samples"] = choose(level, seconds)
         self._dispatch("make_plan", *self.size)
         plan = self._gpu.read_buffer(self._plan)[: self.size[0] * self.size[1]]
         self._samples, self._most, self._batches = float(plan.mean()), int(plan.max()), 0
