@@ -68,12 +68,12 @@ class Settings:
     truth_scenes: tuple[str, ...] = ("box", "blinds", "courtyard")
     truth_size: tuple[int, int] = (640, 360)
     truth_target: float = 0.01  # relative standard error
-    truth_seconds: float = 20.0  # the most that one truth may take
+    truth_seconds: float = 15.0  # the most that one truth may take
     truth_steps: int = 2048  # of a march that has converged
     truth_shadow_sizes: tuple[int, ...] = (1024, 4096)  # of the maps that it reads
-    frames: int = 120
-    warmup: int = 30
-    seconds: float = 3.0  # the most that one measurement may take; a GPU seldom needs it
+    frames: int = 100
+    warmup: int = 20
+    seconds: float = 2.5  # the most that one measurement may take; a GPU seldom needs it
 
     def parameters(self) -> Overrides:
         """Parameters of the techniques at these settings, by technique name."""

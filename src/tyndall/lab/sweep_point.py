@@ -19,6 +19,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 from tyndall.gpu.device import Gpu
@@ -215,7 +216,9 @@ def _errors(still: Still, targets: Mapping[str, Target], asked: str) -> Plain:
             "bias": metrics.bias(light, target.light),
         }
         return {"inscattered": {name: _rounded(value) for name, value in figures.items()}}
-    return {kind: metrics.score(still.of(kind), target).to_json() for kind, target in targets.items()}
+    with ThreadPoolExecutor(len(targets)) as pool:  # numpy and FLIP let other threads run
+        scores = pool.map(lambda kind: metrics.score(still.of(kind), targets[kind]).to_json(), targets)
+        return dict(zip(targets, scores, strict=True))
 
 
 def _rounded(value: float | None) -> float | None:

@@ -282,11 +282,6 @@ def test_points_are_drawn_and_held_against_the_truth(gpu: Gpu, tmp_path: Path, m
     assert float(table[2]["gpu_ms.median"]) == fine["gpu_ms"]["median"]
 
 
-def test_a_worker_process_draws_too(tmp_path: Path) -> None:
-    (row,) = sweep({"scenes": "box", "techniques": "off", "sizes": "16x9", "frames": 1, "warmup": 0}, tmp_path).rows
-    assert (row["status"], row["triangles"]) == ("done", 4968)
-
-
 def test_what_cannot_be_drawn_is_told_and_the_rest_goes_on(gpu: Gpu, tmp_path: Path) -> None:
     sizes = [[10**6, 4], [16, 9]]
     point = {"scenes": "box", "techniques": "off", "sizes": sizes, "frames": 0}
