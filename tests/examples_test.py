@@ -15,6 +15,7 @@ LEAVES = {
     "own_scene": ["pyramid.json", "pyramid.png"],
     "orbit": ["orbit.webp"],
     "cost_of_lights": [],
+    "soft_shadows": ["point.png", "bulb.png", "lantern.png"],
     "sweep_grids": ["sweep"],
 }
 
