@@ -57,9 +57,11 @@ class Report:
     Attributes:
         adapters: every adapter that answers, best first.
         missing: one line per problem, with its remedy; not each keeps Tyndall from drawing.
+        mitsuba: the variant of Mitsuba that can judge pictures here, and why no better one; or how to get it.
     """
 
     adapters: tuple[Adapter, ...]
+    mitsuba: str
     python: str
     system: str
     packages: Mapping[str, str | None]
@@ -84,6 +86,7 @@ class Report:
                 }
                 for a in self.adapters
             ],
+            "mitsuba": self.mitsuba,
             "python": self.python,
             "system": self.system,
             "packages": dict(self.packages),
@@ -110,6 +113,7 @@ class Report:
             parts += [table, Text()]
         parts.append(Text.from_markup(f"[bold]Python[/] {self.python} on {self.system}"))
         parts.append(Text(", ".join(f"{name} {version or 'missing'}" for name, version in self.packages.items())))
+        parts.append(Text(f"truth by another renderer: {self.mitsuba}"))
         parts += [Text.from_markup(f"[yellow]![/] {escape(line)}") for line in self.missing]
         verdict = "[green]Tyndall can draw here.[/]" if self.can_render else "[red]Tyndall cannot draw here.[/]"
         parts.append(Text.from_markup(verdict))
@@ -148,7 +152,16 @@ def diagnose(adapter: str | None = None) -> Report:
             missing.append("no adapter has timestamp queries: passes cannot be timed")
     python = f"{platform.python_version()} ({sys.executable})"
     system = f"{platform.system()} {platform.release()} {platform.machine()}"
-    return Report(adapters, python, system, packages, tuple(missing))
+    return Report(adapters, _mitsuba(), python, system, packages, tuple(missing))
+
+
+def _mitsuba() -> str:
+    """Tried in processes of its own; a second or two where it is installed."""
+    try:
+        from tyndall.lab.mitsuba import available
+    except (ImportError, OSError):
+        return "not looked for: wgpu does not load"
+    return str(available())
 
 
 def _describe(native: Any, chosen: Mapping[str, Any] | None) -> Adapter:

@@ -21,7 +21,6 @@ The error of a pixel comes from the scatter of its samples, which are independen
 from __future__ import annotations
 
 import contextlib
-import ctypes.util
 import dataclasses
 import json
 import logging
@@ -57,6 +56,7 @@ VARIANTS = ("cuda_ad_rgb", "llvm_ad_rgb", "scalar_rgb")
 _PROBE_S = 120.0  # a variant that takes longer to draw 16 pixels is taken for broken
 _SILENCE_S = 1800.0  # a pass reports when it is done; without a word for so long, the process hangs
 _OLDEST_LLVM = 15
+_GET_LLVM = "apt-get install libllvm19, or name one by DRJIT_LIBLLVM_PATH"
 _MAPS = {"base_color": True, "metallic_roughness": False, "normal": False, "emissive": True}  # and whether sRGB
 
 
@@ -93,8 +93,9 @@ class Availability:
     def __str__(self) -> str:
         if self.variant is None:
             return "; ".join(self.failures)
-        with_llvm = f", with {self.variant.llvm}" if self.variant.llvm else ""
-        return f"Mitsuba {self.variant.version}, {self.variant.name}{with_llvm}"
+        with_llvm = f" with {self.variant.llvm}" if self.variant.llvm else ""
+        why = f" ({'; '.join(self.failures)})" if self.failures else ""
+        return f"Mitsuba {self.variant.version}, {self.variant.name}{with_llvm}{why}"
 
 
 @cache
@@ -123,11 +124,9 @@ def _try(name: str) -> Variant:
     """
     if not _installed():
         raise MitsubaError(f"Mitsuba is not installed: {GET}")
-    if name.startswith("cuda") and not ctypes.util.find_library("cuda"):
-        raise MitsubaError(f"Mitsuba's {name} needs an NVIDIA driver, and there is none")
     libraries: tuple[str | None, ...] = llvm_libraries() if name.startswith("llvm") else (None,)
     if not libraries:
-        raise MitsubaError(f"Mitsuba's {name} finds no LLVM library: apt-get install libllvm19, or DRJIT_LIBLLVM_PATH")
+        raise MitsubaError(f"Mitsuba's {name} finds no LLVM library: {_GET_LLVM}")
     failures = []
     for library in libraries:
         try:
@@ -137,7 +136,7 @@ def _try(name: str) -> Variant:
             failures.append(f"{error} ({library})" if library else str(error))
         else:
             return Variant(name, library, said[-1]["version"])
-    raise MitsubaError(failures[0])
+    raise MitsubaError(f"{failures[0]}: {_GET_LLVM}" if name.startswith("llvm") else failures[0])
 
 
 def _installed() -> bool:
