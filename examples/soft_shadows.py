@@ -16,6 +16,7 @@ scene = ty.Scene(
 for name, radius in (("point", 0.0), ("bulb", 0.15), ("lantern", 0.6)):
     lamp = ty.PointLight(position=(2.5, 3, 1.5), intensity=40, radius=radius)
     lit = scene.with_(lights=(lamp,))
-    traced = {"shadow": "ray_traced", "occlusion": "ray_traced_ao"}
-    picture = ty.render(lit, size=(240, 135), volumetric="off", frames=8, **traced)
+    picture = ty.render(
+        lit, size=(240, 135), volumetric="off", shadow="ray_traced", occlusion="ray_traced_ao", frames=8
+    )
     picture.save(f"{name}.png")
