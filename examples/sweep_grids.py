@@ -5,8 +5,8 @@ import tyndall as ty
 spec = {
     "scenes": "box",
     "lights": [1, 2],
-    "sizes": "96x54",
-    "techniques": ["off", {"technique": "froxel", "grid": [[24, 14, 16], [48, 27, 32]]}],
+    "sizes": "48x27",
+    "techniques": ["off", {"technique": "froxel", "grid": [[12, 7, 8], [24, 14, 16]]}],
     "truth": "march",
     "frames": 3,
     "warmup": 1,
