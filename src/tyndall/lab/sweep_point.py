@@ -3,7 +3,7 @@
 A worker is told a point as plain data and answers with plain data. It keeps its device, and the scene, the stage and
 the judge's picture of the point before, so that points of one stage that follow each other build nothing twice.
 Everything that touches the device happens under a lock of that device's name, so that what is timed runs alone on it;
-errors are worked out after the lock is given back.
+errors are worked out after the lock is given back, unless the device is the processor itself.
 """
 
 from __future__ import annotations
@@ -64,6 +64,7 @@ class Station(Closing):
         self._owned = not isinstance(adapter, Gpu)
         self.gpu = adapter if isinstance(adapter, Gpu) else Gpu(adapter, rank=rank)
         self._lock = f"{self.gpu.adapter_info['device']} {self.gpu.rank}"
+        self._draws_on_processor = self.gpu.adapter_info["adapter_type"] == "CPU"
         self._scene: tuple[Any, Scene] | None = None
         self._stage: tuple[Any, Stage] | None = None
         self._judged: tuple[Any, dict[str, Target], Plain] | None = None
@@ -82,13 +83,17 @@ class Station(Closing):
         begun = time.monotonic()
         scene = self._open(point["scene"], point["lights"], expected)
         technique = technique_of("volumetric", point["technique"])
+        errors = None
         with device_lock(self._lock):
             stage = self._prepare(scene, point)
             judged = self._judge(stage, point)
             figures = _figures(stage, technique, point)
             # Shadows of lights with a size are sampled: a still gathers some frames, as those of a comparison do.
             still = stage.still(technique, frames=SOFT_FRAMES if is_soft(scene) else 1) if judged else None
-        errors = _errors(still, judged[0], point["metrics"]) if judged and still else None
+            if judged and still and self._draws_on_processor:
+                errors = _errors(still, judged[0], point["metrics"])
+        if judged and still and not self._draws_on_processor:
+            errors = _errors(still, judged[0], point["metrics"])
         return {
             "scene_name": scene.name,
             "triangles": scene.triangle_count,
