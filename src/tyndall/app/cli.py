@@ -214,7 +214,7 @@ def compare(
         raise ParameterError(f"--{family}: it is {family} techniques that are compared; --technique names them")
     if model is not None and family != "volumetric":
         raise ParameterError("--model: only volumetric techniques have models")
-    settings, flags = _truth_settings(context)
+    settings, flags = _truth_settings(context, truth)
     parameters = _parameters(flags, family, chosen or list(FAMILIES[family].members), others)
     techniques: dict[str, Any] = {**others, family: chosen}
     with console.Work("loading") as work:
@@ -373,16 +373,16 @@ def _others(**chosen: str | None) -> dict[str, str]:
     return {family: name.replace("-", "_") for family, name in chosen.items() if name is not None}
 
 
-def _truth_settings(context: typer.Context) -> tuple[TruthSettings | None, list[tuple[str, str, str]]]:
+def _truth_settings(context: typer.Context, judge: str) -> tuple[TruthSettings | None, list[tuple[str, str, str]]]:
     """The settings of the truth from ``--truth.name value`` flags, None without any; and the other flags."""
-    from tyndall.lab.standard import DEFAULT_SETTINGS
+    from tyndall.lab.standard import default_settings
     from tyndall.lab.truth import TruthSettings
 
     given: Given = context.obj
     wanted = [flag for flag in given.flags if flag[0] == "truth"]
     others = [flag for flag in given.flags if flag[0] != "truth"]
     changes = arguments.convert_flags(wanted, {"truth": TruthSettings})
-    return (replace(DEFAULT_SETTINGS, changes["truth"]) if changes else None), others
+    return (replace(default_settings(judge), changes["truth"]) if changes else None), others
 
 
 def _parameters(

@@ -88,7 +88,8 @@ def compare(
         parameters: by technique name, parameters to change: ``{"froxel": {"grid": (190, 90, 128)}}``.
         truth: what errors are against: "traced", "march", "mitsuba", a truth that is there already, or None for no
             errors.
-        truth_settings: when a traced truth is good enough; the default stops at 1 %, or after 20 s.
+        truth_settings: when a traced truth is good enough; None is
+            :func:`tyndall.lab.standard.default_settings`: 1 %, or what 20 s give.
         frames, warmup: frames measured, and drawn before that; None is 64 and 16, or fewer on a slow adapter.
         out: folder to save into (:meth:`~tyndall.lab.comparison.Comparison.save`).
         adapter: part of an adapter's name, or a device to share.

@@ -38,7 +38,8 @@ SYMBOLS = {"inscattered": "L_v", "surfaces": "L_b·T", "radiance": "L"}
 LAYERS = {"inscattered": "inscatter", "surfaces": "surfaces", "radiance": ""}  # in EXR files
 
 # Long enough for a percent on a GPU, and short enough for a first look without one; the table says how sure it is.
-DEFAULT_SETTINGS = TruthSettings(seconds=20.0, filter="centre")
+# Mitsuba has to load the scene and compile its kernels first.
+_SECONDS = {"traced": 20.0, "mitsuba": 120.0}
 
 Floats = NDArray[np.float32]
 
@@ -72,7 +73,7 @@ class Standard:
             state = "converged" if self.march.within else "NOT converged"
             change = f"doubling changes L_v by {100 * self.march.change:.2f} %"
             return f"truth: march on the same shadow map, {self.march.steps} steps, {state} ({change})"
-        noise = ", ".join(f"{100 * error:.2g} % of {SYMBOLS[kind]}" for kind, error in self.noise.items())
+        noise = ", ".join(f"{_percent(error)} of {SYMBOLS[kind]}" for kind, error in self.noise.items())
         truth = self.truth
         return f"truth: {truth.judge}, {truth.samples} samples a pixel, {truth.seconds:.1f} s; its own error is {noise}"
 
@@ -120,7 +121,7 @@ def prepare(
 
     Args:
         truth: one of :data:`JUDGES`, or one that is there already.
-        settings: when a traced one is good enough; the default stops after 20 s.
+        settings: when a traced one is good enough; None is :func:`default_settings`.
 
     Raises:
         ParameterError: a truth of another size.
@@ -136,9 +137,10 @@ def prepare(
     elif truth == "mitsuba":
         from tyndall.lab.mitsuba import judge
 
-        found = judge(stage.scene, stage.size, settings or DEFAULT_SETTINGS, progress=progress)
+        found = judge(stage.scene, stage.size, settings or default_settings(truth), progress=progress)
     else:
-        found = trace(stage.scene, stage.size, settings or DEFAULT_SETTINGS, gpu=stage.gpu, progress=progress)
+        settings = settings or default_settings(truth)
+        found = trace(stage.scene, stage.size, settings, gpu=stage.gpu, progress=progress)
     if found.radiance.shape[1::-1] != tuple(stage.size):
         raise ParameterError(
             "truth: is {}×{} pixels, and the comparison {}×{}".format(*found.radiance.shape[1::-1], *stage.size)
@@ -153,6 +155,11 @@ def prepare(
     depth = full.picture.depth if found.depth is None else found.depth
     made = {**full.picture.metadata, "technique": f"truth: {found.judge}"}
     return Standard(found, targets, Picture(pixels, found.radiance, depth, made), pixels)
+
+
+def default_settings(judge: str) -> TruthSettings:
+    """A relative standard error of 1 %, or what 20 s give of a traced truth, 120 s of Mitsuba's."""
+    return TruthSettings(seconds=_SECONDS.get(judge, 0.0), filter="centre")
 
 
 def check(family: str, truth: str | Truth | None, settings: TruthSettings | None = None) -> None:
@@ -232,3 +239,9 @@ def _error(truth: Truth, kind: str) -> Floats | None:
     else:
         error = getattr(truth, f"{kind}_error")
     return error if error.any() else None
+
+
+def _percent(fraction: float) -> str:
+    """Two digits; whole numbers from a hundred on."""
+    percent = 100 * fraction
+    return f"{percent:.0f} %" if percent >= 100 else f"{percent:.2g} %"

@@ -128,6 +128,8 @@ def test_the_march_judges_no_shadows() -> None:
         standard.check("shadow", "march")
 
 
-def test_the_default_is_quick_and_looks_through_the_middle_of_pixels() -> None:
-    assert 0 < standard.DEFAULT_SETTINGS.seconds <= 30
-    assert standard.DEFAULT_SETTINGS.filter == "centre"
+@pytest.mark.parametrize("judge", ["traced", "mitsuba"])
+def test_the_default_ends_and_looks_through_the_middle_of_pixels(judge: str) -> None:
+    settings = standard.default_settings(judge)
+    assert 0 < settings.seconds <= 120
+    standard.check("shadow", judge, settings)
