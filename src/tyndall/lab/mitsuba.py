@@ -352,7 +352,8 @@ def export(scene: Scene, size: tuple[int, int], folder: Path) -> dict[str, Any]:
         by_material.setdefault(id(material), (material, []))[1].append(index)
     images: dict[int, str] = {}
     texels: dict[str, NDArray[np.uint8]] = {}
-    materials, meshes = [], []
+    materials: list[dict[str, Any]] = []
+    meshes: list[dict[str, Any]] = []
     for number, (material, members) in enumerate(by_material.values()):
         maps = {}
         for name, srgb in _MAPS.items():
@@ -383,8 +384,13 @@ def export(scene: Scene, size: tuple[int, int], folder: Path) -> dict[str, Any]:
             }
         )
         file = f"mesh{number}.ply"
-        write_ply(folder / file, *_baked(scene, members))
+        positions, normals, uvs, triangles = _baked(scene, members)
+        write_ply(folder / file, positions, normals, uvs, triangles)
         meshes.append({"file": file, "material": number})
+        if np.ptp(np.linalg.norm(normals, axis=1)) > 1e-4:
+            # Mitsuba makes a file's normals unit vectors. A stretched instance's are not, and weigh as they are long.
+            meshes[-1]["normals"] = f"mesh{number}.npy"
+            np.save(folder / f"mesh{number}.npy", normals)
     if texels:
         np.savez(folder / "images.npz", **texels)  # type: ignore[arg-type, unused-ignore]
 
@@ -414,7 +420,10 @@ def export(scene: Scene, size: tuple[int, int], folder: Path) -> dict[str, Any]:
 def _baked(
     scene: Scene, members: list[int]
 ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], NDArray[np.int64]]:
-    """Positions, normals, texture coordinates and triangles of some instances, in world space."""
+    """Positions, normals, texture coordinates and triangles of some instances, in world space.
+
+    Normals of an instance keep their proportions: they are interpolated before they are made unit vectors.
+    """
     parts: list[list[NDArray[Any]]] = [[], [], [], []]
     first = 0
     for index in members:
@@ -427,9 +436,9 @@ def _baked(
         mirrored = np.linalg.det(linear) < 0
         cofactors = np.stack([np.cross(y, z), np.cross(z, x), np.cross(x, y)], axis=1) * (-1 if mirrored else 1)
         normals = np.asarray(mesh.normals, np.float64) @ cofactors.T
-        length = np.linalg.norm(normals, axis=1, keepdims=True)
+        length = np.linalg.norm(normals, axis=1).max()
         parts[0].append((mesh.positions.astype(np.float64) @ linear.T + matrix[:3, 3]).astype(np.float32))
-        parts[1].append((normals / np.where(length > 0, length, 1)).astype(np.float32))
+        parts[1].append((normals / (length or 1.0)).astype(np.float32))
         parts[2].append(np.zeros((len(mesh.positions), 2), np.float32) if mesh.uvs is None else mesh.uvs)
         triangles = mesh.indices.astype(np.int64) + first
         parts[3].append(triangles[:, [0, 2, 1]] if mirrored else triangles)

@@ -294,6 +294,12 @@ class Tracer:
                 if asked:  # Mitsuba refuses a scene whose lights all have no weight
                     shape["emitter"]["sampling_weight"] = 0.0
             scene[f"mesh {index}"] = shape
+            if "normals" in mesh:
+                scene[f"mesh {index}"] = loaded = mi.load_dict(shape)
+                parameters = mi.traverse(loaded)
+                normals = np.load(folder / mesh["normals"]).ravel()
+                parameters["vertex_normals"] = type(parameters["vertex_normals"])(normals)
+                parameters.update()
         if len(scene) == 1 + len(content["lights"]) and not medium:
             scene["nothing"] = {"type": "sphere", "radius": 1e-6, "center": [0.0, -1e6, 0.0]}
         self.scene = mi.load_dict(scene)
