@@ -319,7 +319,7 @@ def test_error_maps_share_one_scale_and_tell_their_values(room: Opened, pages: d
 
 
 def test_the_colours_of_the_bar_are_those_of_the_maps(room: Opened) -> None:
-    gradient = room.tab.eval_on_selector('[data-role="ramp"]', "(e) => e.style.background")
+    gradient = room.tab.eval_on_selector('[data-role="ramp"]', "(e) => getComputedStyle(e).backgroundImage")
     first, last = colour_map()[0], colour_map()[255]
     assert f"rgb({first[0]}, {first[1]}, {first[2]})" in gradient
     assert f"rgb({last[0]}, {last[1]}, {last[2]})" in gradient
@@ -454,6 +454,16 @@ def test_text_has_the_contrast_that_it_needs(browser: Any, pages: dict[str, Path
     opened.close()
 
 
+def test_tables_fit_on_paper(room: Opened) -> None:
+    room.tab.emulate_media(media="print")
+    room.tab.evaluate("dispatchEvent(new Event('beforeprint'))")
+    widths = room.tab.eval_on_selector_all(".scroll table", "all => all.map((t) => t.getBoundingClientRect().width)")
+    assert max(widths) <= 681
+    assert room.tab.locator(".bar, .tools").filter(visible=True).count() == 0
+    room.tab.evaluate("dispatchEvent(new Event('afterprint'))")
+    assert room.tab.eval_on_selector(".sortable", "(table) => table.style.zoom") == ""
+
+
 def test_motion_is_for_those_who_want_it(browser: Any, pages: dict[str, Path]) -> None:
     still = Opened(browser, pages["room"], reduced_motion="reduce")
     assert still.tab.evaluate("getComputedStyle(document.documentElement).scrollBehavior") == "auto"
@@ -534,5 +544,39 @@ def test_a_sweep_is_plotted_against_what_varies(browser: Any, pages: dict[str, P
     assert first.locator(".dot").count() == 4
     opened.tab.locator('.sortable thead button[aria-label^="GPU time of the technique"]').click()
     assert opened.tab.locator(".sortable tbody tr").count() == 12
+    assert opened.said == []
+    opened.close()
+
+
+def test_two_fingers_zoom_and_one_moves(browser: Any, pages: dict[str, Path]) -> None:
+    opened = Opened(browser, pages["room"], viewport={"width": 400, "height": 800}, has_touch=True, is_mobile=True)
+    left, top, width, height = opened.stage()
+    touch = opened.tab.context.new_cdp_session(opened.tab)
+
+    def fingers(kind: str, *places: tuple[float, float]) -> None:
+        points = [{"x": left + x * width, "y": top + y * height, "id": i} for i, (x, y) in enumerate(places)]
+        touch.send("Input.dispatchTouchEvent", {"type": f"touch{kind}", "touchPoints": points})
+        opened.settle()
+
+    assert opened.tab.evaluate("getComputedStyle(document.querySelector('.stage')).touchAction") == "pan-y"
+    before = float(opened.text("zoom").rstrip(" %"))
+    fingers("Start", (0.2, 0.5), (0.4, 0.5))
+    fingers("Move", (0.15, 0.5), (0.5, 0.5))
+    fingers("Move", (0.1, 0.5), (0.7, 0.5))
+    fingers("End")
+    after = float(opened.text("zoom").rstrip(" %"))
+    assert after / before == pytest.approx(3, rel=0.1)
+    assert opened.tab.evaluate("getComputedStyle(document.querySelector('.stage')).touchAction") == "none"
+
+    opened.role("frames").uncheck()
+    opened.stage()
+    picture = opened.pixels()
+    fingers("Start", (0.8, 0.3))
+    fingers("Move", (0.75, 0.3))
+    fingers("Move", (0.6, 0.3))
+    fingers("End")
+    assert (opened.pixels() != picture).any()
+    assert opened.role("divider").get_attribute("aria-valuenow") == "50"
+    assert opened.tab.locator(".place").count() == 3, "a drag takes no close-up"
     assert opened.said == []
     opened.close()

@@ -117,5 +117,5 @@ def encode_map(error: Map, scale: Scale) -> bytes:
     image = Image.fromarray(scale.index(error), "L")
     image.putpalette(colour_map().tobytes())
     buffer = io.BytesIO()
-    image.save(buffer, "png", optimize=True)
+    image.save(buffer, "png")
     return buffer.getvalue()

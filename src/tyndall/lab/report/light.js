@@ -108,7 +108,10 @@ function makeGallery(article, study, state, arrived) {
     decodeLight(block.textContent, width, height).then((found) => {
       codes.set(index, found);
       arrived();
-    }, (error) => console.error(`picture ${index} cannot be decoded: ${error}`));
+    }, (error) => {
+      codes.set(index, undefined); // its 8-bit picture stays
+      console.error(`picture ${index} cannot be decoded: ${error}`);
+    });
     return null;
   }
 

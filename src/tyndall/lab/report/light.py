@@ -32,7 +32,7 @@ def encode_light(radiance: Light) -> bytes:
     steps = np.diff(planes, axis=2, prepend=0)
     folded = ((steps << 1) ^ (steps >> 31)).astype(np.uint16)  # the sign goes to the lowest bit: small steps are small
     both = np.concatenate([(folded & 255).astype(np.uint8).ravel(), (folded >> 8).astype(np.uint8).ravel()])
-    return zlib.compress(both.tobytes(), 9)
+    return zlib.compress(both.tobytes(), 6)
 
 
 def read_exr(path: Path) -> dict[str, NDArray[Any]]:

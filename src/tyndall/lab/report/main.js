@@ -108,4 +108,10 @@ function setUpChoice() {
 setUpTheme();
 if (document.querySelector(".comparison")) setUpChoice();
 document.querySelectorAll(".sweep").forEach(setUpSweep);
-addEventListener("beforeprint", () => document.querySelectorAll("details").forEach((d) => { d.open = true; }));
+
+// Paper does not scroll: wide tables are made to fit it.
+const PAPER = 680;
+addEventListener("beforeprint", () => document.querySelectorAll(".scroll table").forEach((table) => {
+  table.style.zoom = Math.min(1, PAPER / table.scrollWidth);
+}));
+addEventListener("afterprint", () => document.querySelectorAll(".scroll table").forEach((table) => { table.style.zoom = ""; }));

@@ -39,15 +39,11 @@ function errorText(scale, number) {
   return bound + percent(errorOfColour(scale, number));
 }
 
-/** The colours from left to right, as CSS. */
-const rampOfColours = () => `linear-gradient(90deg, ${shared.palette.filter((_, i) => i % 5 === 0).join(",")})`;
-
 function setUpMaps(article, study, state) {
   const [width, height] = study.size;
   for (const figure of article.querySelectorAll(".maps")) {
     const scale = study.maps[figure.dataset.kind];
     const ramp = figure.querySelector('[data-role="ramp"]');
-    ramp.style.background = rampOfColours();
     const cells = [...figure.querySelectorAll(".grid figure")].map((cell) => {
       const image = cell.querySelector("img"), cross = make("i", { class: "cross", hidden: true });
       cell.append(cross);

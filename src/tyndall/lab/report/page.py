@@ -56,7 +56,8 @@ def page(
               "kinds": verdict.KINDS, "colours": COLOURS}, id="shared"),
     )  # fmt: skip
     script = "\n".join(_asset(name) for name in _SCRIPTS)
-    style = _asset("report.css")
+    colours = ["#" + bytes(colour).hex() for colour in colour_map()]
+    style = f":root {{ --ramp: linear-gradient(90deg, {', '.join(colours[::5])}); }}\n{_asset('report.css')}"
     for name, text in (("script", script), ("style", style)):
         if f"</{name}" in text:
             raise AssertionError(f"the {name} would end its own element")
@@ -325,6 +326,7 @@ def _cost(study: Study, prefix: str) -> Html:
         costs = [("gpu", "GPU time of the technique"), ("frame", "GPU time of the frame"), ("memory", "memory")]
         options = [tag("option", text, value=value) for value, text in costs if _has_cost(study, value)]
         pickers.append(tag("label", tag("span", "Cost"), tag("select", *options, data_role="cost")))
+    has_baseline = any(result.technique == verdict.BASELINE for result in study.results)
     scatter = tag(
         "figure",
         tag("div", *pickers, class_="tools script") if pickers else None,
@@ -334,7 +336,9 @@ def _cost(study: Study, prefix: str) -> Html:
             "Down and left is better. The line is the Pareto front: no technique is both cheaper and more accurate "
             "than one on it. Whiskers reach from the least disturbed frame to the 95th percentile; an arrow down marks "
             "an error that the truth’s noise hides, drawn at what it may be at most; hatched is that noise, where it "
-            "is in the error. The dashed line is drawing no light at all. A point opens its picture against the truth.",
+            "is in the error. ",
+            "The dashed line is drawing no light at all. " if has_baseline else None,
+            "A point opens its picture against the truth.",
             class_="script",
         ),
         tag("details", tag("summary", "The plot’s data as a table"), _scatter_table(study)),

@@ -122,9 +122,10 @@ function setUpScatter(article, study, state) {
     // Errors that the truth's noise hides are equal: nothing tells them apart.
     const ranked = points.map((p) => ({ ...p, shown: p.error, error: p.hidden ? 0 : sign * p.error }));
     const front = paretoFront(ranked).map((p) => [x.at(p.cost), y.at(p.shown * percentage)]);
+    const step = front.map(([fx], i) => [fx, Math.max(...front.slice(0, i + 1).map(([, fy]) => fy))]); // it never rises
     if (front.length) {
       // A step: between two points nothing better is known than the one on the left.
-      const path = front.map(([fx, fy], i) => (i ? `H${fx}V${fy}` : `M${fx},${top}V${fy}`)).join("") + `H${width - right}`;
+      const path = step.map(([fx, fy], i) => (i ? `H${fx}V${fy}` : `M${fx},${top}V${fy}`)).join("") + `H${width - right}`;
       svg.append(draw("path", { d: path, class: "front" }));
     }
     // Labels keep off marks, whiskers and lines.

@@ -170,7 +170,7 @@ function setUpViewer(article, study, state, gallery) {
     stage.setPointerCapture(event.pointerId);
     const onDivider = Math.abs(local(event)[0] - state.values.split * stage.clientWidth) < 22;
     const moves = pointers.size > 1 ? "pinch" : onDivider ? "divider" : view.scale ? "picture" : "divider from afar";
-    drag = { moves, start: local(event), far: false };
+    drag = { moves, start: local(event), far: moves === "pinch" }; // what has been far is no click
     if (event.target.closest('[role="slider"]')) return;
     stage.focus({ preventScroll: true });
   });
@@ -289,7 +289,6 @@ function setUpViewer(article, study, state, gallery) {
     line.replaceChildren(`pixel ${probe.join(", ")} `, make("br"), ...values[0], make("br"), ...values[1]);
   });
 
-  part("scale").querySelector("i").style.background = rampOfColours();
   refresh();
 }
 
