@@ -34,7 +34,8 @@ from tyndall.lab.metrics import Target
 from tyndall.lab.reference import find
 from tyndall.lab.scenes import open_scene
 from tyndall.lab.stage import Stage, Still
-from tyndall.lab.sweep_spec import OTHERS, judge_settings
+from tyndall.lab.sweep_spec import OTHERS
+from tyndall.lab.truth import Truth, TruthSettings
 from tyndall.scene import bundled
 from tyndall.scene.model import Scene
 from tyndall.techniques import FAMILIES
@@ -68,6 +69,7 @@ class Station(Closing):
         self._scene: tuple[Any, Scene] | None = None
         self._stage: tuple[Any, Stage] | None = None
         self._judged: tuple[Any, dict[str, Target], Plain] | None = None
+        self._truth: tuple[Any, Truth] | None = None
 
     def measure(self, point: Mapping[str, Any], expected: str) -> Plain:
         """The figures of a point: its row, but for what tells it apart.
@@ -119,11 +121,11 @@ class Station(Closing):
         return self._scene[1]
 
     def _prepare(self, scene: Scene, point: Mapping[str, Any]) -> Stage:
-        key = (id(scene), [point[name] for name in ("size", *OTHERS, "seed")])
+        key = [point[name] for name in ("size", *OTHERS, "seed")]  # of this scene: another scene forgets it
         if self._stage is None or self._stage[0] != key:
             if self._stage is not None:
                 self._stage[1].close()
-                self._stage = None
+            self._stage = self._judged = None
             others: dict[str, Any] = {family: technique_of(family, point[family]) for family in OTHERS}
             width, height = point["size"]
             stage = Stage(scene, (width, height), adapter=self.gpu, seed=point["seed"], **others)
@@ -135,15 +137,35 @@ class Station(Closing):
         asked = point["truth"]
         if asked is None:
             return None
-        key = (id(stage), asked, point["metrics"])
+        key = (asked, point["metrics"])  # of this stage: another stage forgets it
         if self._judged is None or self._judged[0] != key:
-            self._judged = (key, *_judged(stage, asked, point["metrics"]))
+            made = _marched(stage, asked) if asked["judge"] == "march" else self._traced(stage, asked, point["metrics"])
+            self._judged = (key, *made)
         return self._judged[1:]
+
+    def _traced(self, stage: Stage, asked: Mapping[str, Any], figures: str) -> tuple[dict[str, Target], Plain]:
+        """A truth is one for all stages of a scene and a size, whatever their shadows are made of."""
+        key = (stage.size, asked)  # of this scene: another scene forgets it
+        known: str | Truth = asked["judge"]
+        if self._truth is not None and self._truth[0] == key:
+            known = self._truth[1]
+        settings = TruthSettings(**{name: value for name, value in asked.items() if name != "judge"})
+        found = standard.prepare(stage, "volumetric", known, settings)
+        self._truth = key, found.truth
+        targets = dict(found.targets)
+        if figures == "all":
+            targets |= standard.prepare(stage, "shadow", found.truth).targets
+        return targets, {
+            "judge": found.truth.judge,
+            "samples": found.truth.samples,
+            "relative_error": {kind: _rounded(error) for kind, error in found.noise.items()},
+            "seconds": round(found.truth.seconds, 3),
+        }
 
     def _forget(self) -> None:
         if self._stage is not None:
             self._stage[1].close()
-        self._scene = self._stage = self._judged = None
+        self._scene = self._stage = self._judged = self._truth = None
 
     def close(self) -> None:
         """Free everything but a device that was given."""
@@ -152,29 +174,14 @@ class Station(Closing):
             self.gpu.close()
 
 
-def _judged(stage: Stage, asked: Mapping[str, Any], figures: str) -> tuple[dict[str, Target], Plain]:
-    given = {name: value for name, value in asked.items() if name not in ("judge", "shadow")}
-    settings: Any = replace(judge_settings(asked["judge"])(), given)
-    if asked["judge"] == "march":
-        if "shadow" not in asked:
-            return _marched(stage, settings.seconds)
+def _marched(stage: Stage, asked: Mapping[str, Any]) -> tuple[dict[str, Target], Plain]:
+    """A march that has converged, through the stage's own shadows or through others."""
+    if "shadow" in asked:
         kept: dict[str, Any] = {**stage.techniques, "shadow": technique_of("shadow", asked["shadow"])}
         with Stage(stage.scene, stage.size, adapter=stage.gpu, seed=stage.seed, **kept) as other:
-            return _marched(other, settings.seconds)
-    found = standard.prepare(stage, "volumetric", asked["judge"], settings)
-    targets = dict(found.targets)
-    if figures == "all":
-        targets |= standard.prepare(stage, "shadow", found.truth).targets
-    return targets, {
-        "judge": found.truth.judge,
-        "samples": found.truth.samples,
-        "relative_error": {kind: _rounded(error) for kind, error in found.noise.items()},
-        "seconds": round(found.truth.seconds, 3),
-    }
-
-
-def _marched(stage: Stage, seconds: float) -> tuple[dict[str, Target], Plain]:
-    found = find(stage, budget_s=seconds)
+            found = find(other, budget_s=asked["seconds"])
+    else:
+        found = find(stage, budget_s=asked["seconds"])
     targets = {kind: Target(found.still.of(kind)) for kind in ("inscattered", "radiance")}
     return targets, {"judge": "march", **found.to_json()}
 

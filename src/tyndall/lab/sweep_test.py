@@ -20,10 +20,11 @@ import sweep_work
 
 from tyndall.gpu.device import Gpu
 from tyndall.gpu.params import ParameterError
-from tyndall.lab import sweep_store
+from tyndall.lab import standard, sweep_store
 from tyndall.lab.picture import OutputError
 from tyndall.lab.sweep import sweep
 from tyndall.lab.sweep_store import Store, columns_of, flat
+from tyndall.lab.truth import Truth, trace
 from tyndall.scene.files import save
 from tyndall.scene.model import PointLight, Scene
 
@@ -289,6 +290,33 @@ def test_what_cannot_be_drawn_is_told_and_the_rest_goes_on(gpu: Gpu, tmp_path: P
     assert large["status"] == "failed"
     assert "limit" in large["reason"]
     assert small["status"] == "done"
+
+
+def test_each_stage_has_its_own_judge_and_a_truth_is_traced_once(
+    gpu: Gpu, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("TYNDALL_CACHE", str(tmp_path / "cache"))
+    traced: list[object] = []
+
+    def counted(*args: Any, **kwargs: Any) -> Truth:
+        traced.append(args)
+        return trace(*args, **kwargs)
+
+    monkeypatch.setattr(standard, "trace", counted)
+    maps = [{"technique": "shadow_map", "size": size} for size in (16, 32, 64)]
+    common = {"scenes": "box", "techniques": "polygonal", "shadow": maps, "sizes": "24x14", "frames": 0}
+    coarse = {"judge": "march", "shadow": {"technique": "shadow_map", "size": 16}}
+    parts = [
+        {"truth": "march"},
+        {"truth": coarse},
+        {"truth": {"judge": "traced", "target": 0.5}, "metrics": "light"},
+    ]
+    found = sweep({**common, "parts": parts}, tmp_path / "out", adapter=gpu, workers=0)
+    errors = [row["errors"]["inscattered"]["rel_rmse"] for row in found.rows]
+    own, against_coarse = errors[:3], errors[3:6]
+    assert against_coarse[0] == pytest.approx(own[0], rel=1e-3), "the same map"
+    assert against_coarse[2] > 2 * own[2], "another map"
+    assert len(traced) == 1
 
 
 # --- the table ------------------------------------------------------------------------------------------------------
