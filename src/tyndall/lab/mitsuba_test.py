@@ -207,6 +207,44 @@ def test_stretched_instances_shine_as_ours_do(gpu: Gpu) -> None:
     assert off.mean() < 0.005  # at the mesh's seen edges
 
 
+def waves(height: int, width: int, low: int = 0, high: int = 255, blue: int | None = None) -> Image:
+    """Smooth texels that repeat."""
+    y, x = np.mgrid[:height, :width] / height
+    channels = [np.sin(2 * np.pi * (x * (1 + c) + y * (2 - c)) + c) for c in range(4)]
+    pixels = np.stack([low + (high - low) * (0.5 + 0.5 * c) for c in channels], axis=-1).astype(np.uint8)
+    if blue is not None:
+        pixels[..., 2] = blue
+    return Image(pixels)
+
+
+def test_textures_are_read_as_ours_are(gpu: Gpu) -> None:
+    # Each with its own addressing and transform; the mask's holes let light and eye through.
+    patterned = Material(
+        base_color_texture=Texture(waves(16, 16), "mirror", "repeat", offset=(0.1, 0.2), rotation=0.4, scale=(3, 1.4)),
+        metallic=0.8,
+        metallic_roughness_texture=Texture(waves(8, 8, 60), "clamp", "mirror", scale=(2.5, 2.5), offset=(-0.7, -0.7)),
+        normal_texture=Texture(waves(16, 16, 100, 156, 255), scale=(2, 1), rotation=0.3),
+        emissive=(0.03, 0.02, 0.01),
+        emissive_texture=Texture(waves(8, 8), filter="nearest"),
+    )
+    holed = Material(
+        base_color=(0.2, 0.8, 0.3, 0.9),
+        base_color_texture=Texture(waves(16, 16)),
+        alpha_mode="mask",
+        alpha_cutoff=0.45,
+        double_sided=True,
+    )
+    screen = props.quad((0.2, -0.6, -2.5), (1.6, -0.6, -2.9), (1.6, 0.9, -2.9), (0.2, 0.9, -2.5), holed)
+    light = DirectionalLight((-0.4, -0.1, -1), 3.0)
+    scene = Scene((props.wall(-4, 2.5, patterned), screen), (light,), props.AHEAD, ambient=(0.1, 0.1, 0.1))
+    found = draw(scene, (32, 24))
+    ours = trace(scene, (32, 24), TruthSettings(target=0.1), gpu=gpu, cache=False)
+    off = np.abs(found.radiance - ours.radiance) > 2e-3 * ours.radiance.max()
+    assert off.mean() < 0.01  # at edges of holes, and of texels that are not filtered
+    assert 0.02 < (found.depth < 3).mean() < 0.2
+    assert found.radiance.std() > 0.1 * found.radiance.mean()
+
+
 def test_the_bsdf_is_the_shaders_and_draws_what_it_says(tmp_path: Path) -> None:
     materials = [
         Material(base_color=(0.8, 0.5, 0.2, 1), metallic=m, roughness=r) for m, r in ((0, 0.8), (1, 0.4), (0.5, 0.15))
@@ -318,6 +356,12 @@ def occluded(*lights: Any) -> Scene:
     return Scene(inside, lights, props.AHEAD, THICK, background=(0.1, 0.2, 0.3), ambient=(0.05, 0.05, 0.05))
 
 
+def glowing() -> Scene:
+    """An emissive box over a floor, under a sky, without any lamp."""
+    box = props.box((-0.5, -0.9, -3.4), (0.4, -0.2, -2.6), Material(base_color=(0.5, 0.5, 0.5, 1), emissive=(3, 2, 1)))
+    return Scene((props.floor(-1.2, 3, ROUGH), box), (), props.AHEAD, background=(0.2, 0.3, 0.4))
+
+
 THICK = Medium((0.15, 0.15, 0.15), (0.05, 0.05, 0.05), HenyeyGreenstein(0.3), ((-4, -1.2, -5), (4, 4, 2)))
 HIGH = DirectionalLight((0.4, -1, -0.3), 2.0)
 LAMP = PointLight((1.5, 2.0, -1.5), 12.0, (1, 0.8, 0.6))
@@ -339,6 +383,7 @@ SCENES: dict[str, tuple[Scene, int, int]] = {  # with samples and depth
         2,
     ),
     "multiple scattering": (occluded(HIGH), 600, 4),
+    "light of surfaces and sky": (glowing(), 400, 3),
 }
 
 
