@@ -89,27 +89,41 @@ def comparison(document: Mapping[str, Any]) -> str:
     truth = document["reference"]
     width, height = document["size"]
     head = f"**{document['scene']}** ({document['triangles']:,} triangles), {width}×{height}, {document['adapter']}."
-    if truth:
+    if truth and "steps" in truth:
         head += (
             f" Reference: {truth['technique']}, {truth['steps']} steps; "
             f"twice as many change `L_v` by {_percent(truth['change_on_doubling'])}."
         )
-    rows = []
-    for row in document["results"]:
-        error = row["error"] or {"rel_rmse": None, "bias": None, "psnr": None}
-        psnr = error["psnr"]
-        rows.append(
-            [
-                row["technique"] + (" (paper)" if row["model"] == "paper" else ""),
-                *(_ms(row["gpu_ms"][key]) for key in ("median", "min", "p95")),
-                _mib(row["memory_bytes"]),
-                _percent(error["rel_rmse"]),
-                _percent(error["bias"], "+"),
-                f"{psnr:.1f}" if psnr is not None else "–",
-            ]
+    elif truth:
+        kind, noise = next(iter(truth["relative_error"].items()))
+        head += (
+            f" Truth: {truth['judge']}, {truth['samples']} samples a pixel; its own standard error, {_percent(noise)} "
+            f"of the {kind} light, is taken off the errors. *Edges* is the error near edges of shadows; *scaled* is "
+            "what the best-fitting factor leaves where light is right up to one only."
         )
     heading = ["technique", "GPU ms", "min", "p95", "MiB", "rel. RMSE", "bias", "PSNR dB"]
-    return f"{head}\n\n{_table(heading, rows)}\n"
+    if any("errors" in row for row in document["results"]):
+        heading += ["edges", "scaled"]
+    return f"{head}\n\n{_table(heading, [_compared(row) for row in document['results']])}\n"
+
+
+def _compared(row: Mapping[str, Any]) -> list[str]:
+    """A row of :func:`comparison`; longer where all errors are known."""
+    error = row["error"] or {"rel_rmse": None, "bias": None, "psnr": None}
+    known: Mapping[str, Any] = next(iter(row.get("errors", {}).values()), {})
+    limit = known.get("rel_rmse_limit") if known.get("within_noise") else None
+    cells = [
+        row["technique"] + (" (paper)" if row["model"] == "paper" else ""),
+        *(_ms(row["gpu_ms"][key]) for key in ("median", "min", "p95")),
+        _mib(row["memory_bytes"]),
+        f"< {_percent(limit)}" if limit is not None else _percent(known.get("rel_rmse_corrected", error["rel_rmse"])),
+        _percent(error["bias"], "+"),
+        f"{error['psnr']:.1f}" if error["psnr"] is not None else "–",
+    ]
+    if "errors" in row:
+        scaled = known.get("scaled_rel_rmse") if row["up_to_scale"] else None
+        cells += [_percent(known.get("boundary")), _percent(scaled)]
+    return cells
 
 
 def splice(page: str, name: str, text: str) -> str:

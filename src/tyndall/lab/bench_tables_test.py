@@ -198,6 +198,29 @@ def test_an_unfinished_run_has_the_tables_it_can(document: dict[str, Any]) -> No
     assert "### Lights" not in text
 
 
+def test_a_comparison_against_a_traced_truth_shows_what_its_noise_hides() -> None:
+    row = {"model": None, "gpu_ms": {"median": 0.5, "min": 0.4, "p95": 0.6}, "memory_bytes": 2**20}
+    row["error"] = {"rel_rmse": 0.5, "bias": -0.25, "psnr": 30.0}
+    clear = {"rel_rmse_corrected": 0.375, "rel_rmse_limit": 0.4, "within_noise": False, "boundary": 0.75}
+    hidden = {"rel_rmse_corrected": 0.0, "rel_rmse_limit": 0.125, "within_noise": True, "boundary": None}
+    document = {
+        "scene": "box",
+        "triangles": 4968,
+        "size": [320, 180],
+        "adapter": "Test GPU",
+        "reference": {"judge": "traced", "samples": 64, "relative_error": {"inscattered": 0.0625, "radiance": 0.03}},
+        "results": [
+            {**row, "technique": "screen_space", "up_to_scale": True}
+            | {"errors": {"inscattered": {**clear, "scaled_rel_rmse": 0.0625}}},
+            {**row, "technique": "march", "up_to_scale": False, "errors": {"inscattered": hidden}},
+        ],
+    }
+    text = bench_tables.comparison(document)
+    assert "Truth: traced, 64 samples a pixel; its own standard error, 6.25 % of the inscattered light" in text
+    assert "| screen_space | 0.500 | 0.400 | 0.600 | 1.00 | 37.50 % | -25.00 % | 30.0 | 75.00 % | 6.25 % |" in text
+    assert "| march | 0.500 | 0.400 | 0.600 | 1.00 | < 12.50 % | -25.00 % | 30.0 | – | – |" in text
+
+
 def test_a_reference_that_did_not_converge_is_named(document: dict[str, Any]) -> None:
     document["resolution"]["box"]["reference"]["converged"] = False
     assert "1024 steps (not converged)" in bench_tables.markdown(document)

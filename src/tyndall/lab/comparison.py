@@ -330,7 +330,7 @@ def _closeup(result: Result, standard: Standard) -> Any:
     kind = KINDS[result.family][0]
     error = metrics.error_map(result.still.of(kind), standard.targets[kind].light)
     main, symbol = result.main, SYMBOLS[kind]
-    score = f", {symbol} rel. RMSE {100 * main.rel_rmse:.2f} %" if main and main.rel_rmse is not None else ""
+    score = f", {symbol} rel. RMSE {_error(main)} %" if main and main.rel_rmse is not None else ""
     names = (f"truth: {standard.truth.judge}", result.label + score, symbol)
     return strip(standard.still, result.still.picture.pixels, error, names)
 
@@ -350,16 +350,20 @@ def _percent(fraction: float | None, sign: str = "") -> str:
     return f"{percent:{sign}.2f}" if abs(percent) < 100 else f"{percent:{sign}.0f}"
 
 
+def _error(scores: Scores) -> str:
+    """The relative RMSE in percent, the truth's noise taken off, or what that noise might hide."""
+    return f"<{_percent(scores.rel_rmse_limit)}" if scores.within_noise else _percent(scores.rel_rmse_corrected)
+
+
 def _figures(result: Result) -> tuple[str, ...]:
-    """The errors of a row, the truth's noise taken off where that is possible."""
+    """The errors of a row."""
     main = result.main
     if main is None:
         return 5 * ("–",)
     whole = result.scores["radiance"].flip
     psnr = "–" if result.psnr is None or main.rel_rmse is None else f"{result.psnr:.1f}"
-    error = f"<{_percent(main.rel_rmse_limit)}" if main.within_noise else _percent(main.rel_rmse_corrected)
     return (
-        error,
+        _error(main),
         _percent(main.boundary),
         _percent(main.bias, "+"),
         "–" if whole is None else f"{whole:.3f}",

@@ -21,7 +21,7 @@ import tyndall
 from tyndall.scene.model import Scene
 
 _NAMES = frozenset({"name", "looks"})
-_PACKAGES = ("wgpu", "wesl-py", "numpy")
+_PACKAGES = ("wgpu", "wesl-py", "numpy", "scikit-image", "flip-evaluator", "mitsuba")
 
 
 def scene_hash(scene: Scene) -> str:
@@ -64,7 +64,7 @@ def _feed(value: Any, update: Callable[[Any], object], digests: dict[int, bytes]
 
 
 def versions(packages: Iterable[str] = _PACKAGES) -> dict[str, str]:
-    """Versions of Tyndall, Python, the system and the packages that decide a picture and its time, where installed."""
+    """Versions of Tyndall, Python, the system, and packages that decide pictures, times and errors, where installed."""
     found = {
         "tyndall": tyndall.__version__,
         "python": platform.python_version(),
