@@ -112,6 +112,9 @@ document.querySelectorAll(".sweep").forEach(setUpSweep);
 // Paper does not scroll: wide tables are made to fit it.
 const PAPER = 680;
 addEventListener("beforeprint", () => document.querySelectorAll(".scroll table").forEach((table) => {
-  table.style.zoom = Math.min(1, PAPER / table.scrollWidth);
+  const width = table.scrollWidth;
+  if (width > PAPER) Object.assign(table.style, { width: `${width}px`, zoom: PAPER / width });
 }));
-addEventListener("afterprint", () => document.querySelectorAll(".scroll table").forEach((table) => { table.style.zoom = ""; }));
+addEventListener("afterprint", () => document.querySelectorAll(".scroll table").forEach((table) => {
+  Object.assign(table.style, { width: "", zoom: "" });
+}));
