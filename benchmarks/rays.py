@@ -17,11 +17,11 @@ from collections import Counter
 from typing import Any
 
 import numpy as np
+from heading import heading
 
 import tyndall as ty
 from tyndall.frame import view_matrix
 from tyndall.gpu.device import Gpu
-from tyndall.lab.stage import adapter_name, driver_name
 from tyndall.scene.model import Camera, DirectionalLight, Instance, Mesh, Scene
 from tyndall.tracing import bvh, cast
 from tyndall.tracing.world import World
@@ -151,14 +151,14 @@ def main() -> None:
     chosen = parser.parse_args()
     width, height = (int(side) for side in chosen.size.split("x"))
     bvh.RADIUS = chosen.radius
+    scenes = {name: ty.scenes.SCENES[name]() for name in chosen.scenes}
     rows = []
     with Gpu() as gpu:
-        for name in chosen.scenes:
-            scene = ty.scenes.SCENES[name]()
+        for name, scene in scenes.items():
             rows.append(measure(gpu, name, scene, (width, height), chosen.repeat))
             if chosen.flat:
                 rows.append(measure(gpu, f"{name}, flat", flattened(scene), (width, height), chosen.repeat))
-        print(json.dumps({"adapter": adapter_name(gpu), "driver": driver_name(gpu), "rows": rows}, indent=2))
+        print(json.dumps({**heading("rays", gpu, scenes.values()), "rows": rows}, indent=2))
 
 
 if __name__ == "__main__":

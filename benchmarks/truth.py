@@ -17,12 +17,13 @@ import json
 import time
 from typing import Any
 
+from heading import heading
+
 import tyndall as ty
 from tyndall.frame import Renderer
 from tyndall.gpu.device import Gpu
 from tyndall.lab.measure import measure
 from tyndall.lab.mitsuba import MitsubaError, available, judge
-from tyndall.lab.stage import adapter_name, driver_name
 from tyndall.lab.truth import Truth, TruthSettings, trace
 from tyndall.scene.model import DirectionalLight, Scene
 
@@ -67,9 +68,8 @@ def softened(scene: Scene) -> Scene:
     )
 
 
-def shadows(gpu: Gpu, name: str, size: tuple[int, int], seconds: float) -> list[dict[str, Any]]:
+def shadows(gpu: Gpu, scene: Scene, size: tuple[int, int], seconds: float) -> list[dict[str, Any]]:
     rows = []
-    scene = ty.scenes.SCENES[name]()
     cases = [("shadow_map", scene, "none"), ("ray_traced", scene, "none"), ("ray_traced", softened(scene), "none")]
     cases.append(("ray_traced", scene, "ray_traced_ao"))
     for shadow, described, occlusion in cases:
@@ -80,7 +80,7 @@ def shadows(gpu: Gpu, name: str, size: tuple[int, int], seconds: float) -> list[
             times = {family: t.to_json() for family, t in measured.families.items()}
             rows.append(
                 {
-                    "scene": name,
+                    "scene": scene.name,
                     "shadow": shadow,
                     "soft": described is not scene,
                     "occlusion": occlusion,
@@ -93,6 +93,11 @@ def shadows(gpu: Gpu, name: str, size: tuple[int, int], seconds: float) -> list[
     return rows
 
 
+def parse_size(text: str) -> tuple[int, int]:
+    width, height = text.split("x")
+    return int(width), int(height)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--size", default="640x360")
@@ -102,25 +107,23 @@ def main() -> None:
     parser.add_argument("--mitsuba", default="", help="variants, or 'best'; none if empty")
     parser.add_argument("--mitsuba-scenes", default="box")
     parser.add_argument("--seconds", type=float, default=60, help="longest time of a truth")
+    parser.add_argument("--mitsuba-seconds", type=float, default=60, help="longest time of Mitsuba's")
     chosen = parser.parse_args()
-    size = tuple(int(side) for side in chosen.size.split("x"))
-    frame = tuple(int(side) for side in chosen.frame.split("x"))
+    size, frame = parse_size(chosen.size), parse_size(chosen.frame)
     settings = TruthSettings(target=chosen.target, seconds=chosen.seconds)
-    scenes = [name for name in chosen.scenes.split(",") if name]
+    scenes = {name: ty.scenes.SCENES[name]() for name in chosen.scenes.split(",")}
     with Gpu() as gpu:
-        found: dict[str, Any] = {"adapter": adapter_name(gpu), "driver": driver_name(gpu), "size": size}
-        found["target"] = chosen.target
-        found["truth"] = {
-            name: traced(gpu, ty.scenes.SCENES[name](), size, settings)  # type: ignore[arg-type]
-            for name in scenes
-        }
+        found = heading("truth", gpu, scenes.values())
+        found |= {"size": size, "frame": frame, "target": chosen.target}
+        found["truth"] = {name: traced(gpu, scene, size, settings) for name, scene in scenes.items()}
         if min(frame) > 0:
-            found["shadows"] = [row for name in scenes for row in shadows(gpu, name, frame, 4)]  # type: ignore[arg-type]
+            found["shadows"] = [row for scene in scenes.values() for row in shadows(gpu, scene, frame, 4)]
     if chosen.mitsuba:
         found["available"] = str(available())
+        settings = dataclasses.replace(settings, seconds=chosen.mitsuba_seconds)
         found["mitsuba"] = {
             name: [
-                judged(ty.scenes.SCENES[name](), size, settings, "" if variant == "best" else variant)  # type: ignore[arg-type]
+                judged(scenes[name], size, settings, "" if variant == "best" else variant)
                 for variant in chosen.mitsuba.split(",")
             ]
             for name in chosen.mitsuba_scenes.split(",")

@@ -1,7 +1,8 @@
 """Write the tables of ``benchmarks/results/*.json`` into ``docs/benchmarks.md``, each between the marks of its name,
 and the plots of S1's figures into ``docs/images``.
 
-A result is what ``tyndall bench volumetric`` or ``tyndall compare`` saved: ``volumetric.json`` or ``results.json``.
+A result is what ``tyndall bench volumetric`` or ``tyndall compare`` saved, ``volumetric.json`` or ``results.json``, or
+what ``benchmarks/rays.py`` or ``benchmarks/truth.py`` printed.
 """
 
 from __future__ import annotations
@@ -9,6 +10,8 @@ from __future__ import annotations
 import json
 from pathlib import Path
 from typing import Any
+
+import ray_tables
 
 from tyndall.lab.bench_tables import comparison, markdown, plots, splice
 
@@ -31,9 +34,20 @@ def is_bench(document: Any) -> bool:
 def updated(page: str) -> str:
     """The page with the tables of every result."""
     for name, document in results().items():
-        tables = markdown(document, f"images/{name}-") if is_bench(document) else comparison(document)
-        page = splice(page, name, tables)
+        page = splice(page, name, tables(name, document))
     return page
+
+
+def tables(name: str, document: Any) -> str:
+    """A result as Markdown."""
+    match document.get("benchmark"):
+        case "volumetric":
+            return markdown(document, f"images/{name}-")
+        case "rays":
+            return ray_tables.rays(document)
+        case "truth":
+            return ray_tables.truth(document)
+    return comparison(document)
 
 
 def images() -> dict[Path, str]:
