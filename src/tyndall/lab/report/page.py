@@ -284,8 +284,8 @@ def _errors(study: Study, images: Images, prefix: str) -> Html:
                                 for v, at in maps.scale.ticks()),
                         class_="ticks"), class_="bar-of-colours"),
                 tag("div", *cells, class_="grid", style=f"--columns:{len(cells) if len(cells) < 5 else 3}"),
-                tag("figcaption", f"{what}, pixel by pixel, against the truth, whose own noise is in it; one scale for "
-                    "all. Point at a pixel, or move by the arrow keys, to read it in every map."),
+                tag("figcaption", f"{what}, pixel by pixel, against the truth"
+                    f"{', whose own noise is in it' if TRUTH in maps.uris else ''}; one scale for all. Point at a pixel, or move by the arrow keys, to read it in every map."),
                 class_="maps", data_kind=kind)
         )  # fmt: skip
     return tag("section", tag("h2", "Where the error is"), *figures, id=f"{prefix}-errors")

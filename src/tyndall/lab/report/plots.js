@@ -209,7 +209,7 @@ function setUpBars(article, study, role, unit, parts, text) {
     const rows = study.results.map((result, index) => ({ result, index, parts: parts(result).filter(([, value, own]) => value > 0 && (own || all.checked)) }));
     const totals = rows.map((row) => row.parts.reduce((sum, [, value]) => sum + value, 0));
     const most = Math.max(...totals, 1e-12);
-    const gutter = Math.min(120, width * 0.3), space = 74, line = 34, top = 6, height = top + rows.length * line + 40;
+    const gutter = Math.min(150, width * 0.3), space = 74, line = 34, top = 6, height = top + rows.length * line + 40;
     const rough = most / Math.max(2, Math.floor((width - gutter - space) / 90)), power = 10 ** Math.floor(Math.log10(rough));
     const step = [1, 2, 5, 10].map((s) => s * power).find((s) => s >= rough);
     const at = (value) => gutter + (value / most) * (width - gutter - space);

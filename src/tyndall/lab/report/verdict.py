@@ -233,12 +233,16 @@ def remarks(study: Study) -> list[str]:
     worse = [label for label, error in errors.items() if nothing and error.rank > nothing.value]
     if worse:
         text.append(f"No light at all would be nearer to the truth ({nothing}) than {listed(worse)}.")
+    scaled = []
     for result in study.results:
         scores = result.errors.get(kind, {})
         left, factor = scores.get("scaled_rel_rmse"), scores.get("best_scale")
         if result.up_to_scale and left is not None and factor is not None:
-            times = significant(factor, 2)
-            text.append(f"{result.label} is right up to a factor only: times {times}, its error is {percent(left)}.")
+            scaled.append(f"{result.label} (times {significant(factor, 2)} it is {percent(left)} off)")
+    if scaled:
+        text.append(f"Right up to a factor only: {listed(scaled)}.")
+    if any(result.model == "paper" for result in study.results):
+        text.append("What ends in -paper has its paper’s own units, and is held against the same physical truth.")
     noise = study.reference.relative_error.get(kind) if study.reference else None
     if noise:
         hidden = [label for label, error in errors.items() if error.hidden]

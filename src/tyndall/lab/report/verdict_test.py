@@ -88,6 +88,18 @@ def test_off_is_no_candidate_but_a_warning() -> None:
     assert "No light at all would be nearer to the truth (120 %) than wild." in plain(" ".join(remarks(found)))
 
 
+def test_what_is_right_up_to_a_factor_is_said_in_one_sentence() -> None:
+    found = study(("a", 0.1, 3.0), ("b", 0.2, 0.1))
+    rows = [
+        r.model_copy(update={"up_to_scale": True, "errors": {"inscattered": {**r.errors["inscattered"],
+                     "scaled_rel_rmse": 0.25, "best_scale": 0.111}}, "model": "paper"})
+        for r in found.results[:1]
+    ]  # fmt: skip
+    said = plain(" ".join(remarks(found.model_copy(update={"results": [*rows, found.results[1]]}))))
+    assert "Right up to a factor only: a (times 0.11 it is 25 % off)." in said
+    assert "paper’s own units" in said
+
+
 def test_without_times_or_errors_it_says_so() -> None:
     assert "No truth was asked for" in verdict(study(("a", 0.1, None), ("b", 0.2, None)))
     assert "a is the most accurate" in verdict(study(("a", None, 0.1), ("b", None, 0.2)))
