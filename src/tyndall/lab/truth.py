@@ -180,6 +180,7 @@ def trace(
         raise ParameterError(f"size: {size!r} is not a width and a height in whole pixels")
     if min(size) < 1:
         raise GpuError(f"size: {size[0]}×{size[1]} is not a picture")
+    size = int(size[0]), int(size[1])
     entry = _entry(scene, size, settings) if cache else None
     before = _load(entry, size) if entry else None
     if before is not None and _met(before, settings):

@@ -195,11 +195,11 @@ def test_it_agrees_with_the_march_to_the_shadow_maps_error(gpu: Gpu) -> None:
     sun = DirectionalLight((0.6, -1.0, -0.3), 3.0)
     lamp = SpotLight((0.2, 1.5, -4.5), (0, -0.7, 1), 4.0, inner_angle=0.3, outer_angle=0.7)
     blinds = [props.floor(-1), *props.slits(-3, 2.0, 0.3, 4), props.wall(-6)]
-    size = (32, 24)
+    size = (24, 18)
     for light in (sun, lamp):
         scene = Scene(blinds, [light], props.AHEAD, Medium(0.1, 0.02, HenyeyGreenstein(0.3)))
-        found = traced(gpu, scene, TruthSettings(target=0.005), size)
-        shot = props.shoot(gpu, scene, size, volumetric=March(steps=512), shadow=ShadowMap(size=2048))
+        found = traced(gpu, scene, TruthSettings(target=0.01), size)
+        shot = props.shoot(gpu, scene, size, volumetric=March(steps=256), shadow=ShadowMap(size=2048))
         assert props.difference(shot.inscattered, found.inscattered) < 0.03
         assert np.median(np.abs(shot.radiance - found.radiance)) < 0.01 * found.radiance.mean()
         assert shot.inscattered.mean() == pytest.approx(float(found.inscattered.mean()), rel=0.01)
@@ -216,7 +216,7 @@ def test_turning_the_world_turns_the_picture(gpu: Gpu) -> None:
     shapes = [props.floor(-1), *props.slits(-3, 2.0, 0.3, 4), props.wall(-6)]
     lamp = SpotLight((0.5, 1.2, -2), (-0.2, -1, -0.4), 4.0, inner_angle=0.3, outer_angle=0.8)
     other = dataclasses.replace(lamp, position=turned(lamp.position), direction=turned(lamp.direction))
-    settings = TruthSettings(target=0.005)
+    settings = TruthSettings(target=0.01)
     a = traced(gpu, Scene(shapes, [lamp], props.AHEAD, FOG), settings, size)
     b = traced(gpu, Scene([Instance(i.mesh, matrix) for i in shapes], [other], props.AHEAD, FOG), settings, size)
     back = np.rot90(b.inscattered, -1)
