@@ -80,3 +80,14 @@ def test_light_is_developed_as_a_frame_is(gpu: Gpu) -> None:
         assert not stage.develop(np.full((27, 48, 3), -1.0, np.float32)).max() > 1, "but for the dither"
         after = stage.still(make("volumetric", "march", scene))
     assert np.array_equal(after.picture.pixels, still.picture.pixels)
+
+
+def test_with_the_lights_off_what_is_ambient_stays(gpu: Gpu) -> None:
+    scene = box()
+    dark = scene.with_(lights=())
+    with Stage(scene, (48, 27), adapter=gpu) as stage, Stage(dark, (48, 27), adapter=gpu) as other:
+        unlit, expected = stage.unlit(), other.still(make("volumetric", "off", dark))
+        lit = stage.still(make("volumetric", "off", scene))
+    np.testing.assert_array_equal(unlit.surfaces, expected.surfaces)
+    assert unlit.surfaces.mean() > 0, "the scene has ambient light"
+    assert lit.surfaces.mean() > 1.05 * unlit.surfaces.mean(), "the lights are on again"
