@@ -61,10 +61,12 @@ def _of_comparisons(target: Path) -> str:
     studies = [read(path) for path in folders]
     several = len(studies) > 1
     parts = [
-        (f"{study.scene} ({study.folder.name})" if several else study.scene,
-         comparison(study, images(study, MOST_BYTES // len(studies)), number, "h2" if several else "h1"))
+        (
+            f"{study.scene} ({study.folder.name})" if several else study.scene,
+            comparison(study, images(study, MOST_BYTES // len(studies)), number, "h2" if several else "h1"),
+        )
         for number, study in enumerate(studies)
-    ]  # fmt: skip
+    ]
     title = f"{len(studies)} comparisons" if several else studies[0].scene
     return page(f"{title} – Tyndall", parts, ANCHORS, overview(studies) if several else None)
 

@@ -87,8 +87,10 @@ def images(study: Study, most_bytes: int = MOST_BYTES) -> Images:
     if factor > 1:
         notes.append(f"To keep this page light, pictures are shown at 1/{factor} of their size: {width}×{height}.")
     places, patch = _places(study, errors, (width, height), factor)
-    crops = [(place, [_uri(codec.encode_image(place.crop(p), lossless=True), "webp") for p in shown.values()])
-             for place in places]  # fmt: skip
+    crops = [
+        (place, [_uri(codec.encode_image(place.crop(p), lossless=True), "webp") for p in shown.values()])
+        for place in places
+    ]
     return Images(
         size=(width, height),
         keys=list(shown),

@@ -253,6 +253,14 @@ def test_the_command_says_where_the_page_is(tmp_path: Path, capsys: pytest.Captu
     assert page.stat().st_size < 600_000
 
 
+def test_no_asset_ends_the_element_that_it_stands_in() -> None:
+    folder = Path(write_report.__code__.co_filename).parent
+    assets = [*folder.glob("*.js"), *folder.glob("*.css")]
+    assert len(assets) > 5
+    for asset in assets:
+        assert not re.search("</(script|style)", asset.read_text(encoding="utf-8"), re.IGNORECASE), asset.name
+
+
 def test_markup_escapes_text_and_data() -> None:
     assert tag("p", "<b>", title='"&') == '<p title="&quot;&amp;">&lt;b&gt;</p>'
     block = data({"name": "</script><!--"})

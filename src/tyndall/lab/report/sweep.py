@@ -146,9 +146,14 @@ def sweep(rows: Sequence[Row], name: str) -> Html:
     }
     return tag(
         "article",
-        tag("header", tag("h1", name), tag("p", lead, class_="lead"), tag("p", " ".join(notes), class_="remarks"),
+        tag(
+            "header",
+            tag("h1", name),
+            tag("p", lead, class_="lead"),
+            tag("p", " ".join(notes), class_="remarks"),
             tag("dl", *(tag("div", tag("dt", k), tag("dd", v)) for k, v in facts.items() if v), class_="facts"),
-            class_="opening"),
+            class_="opening",
+        ),
         *(
             _explorer(title, f"s-plot{i}", varied, measured, opening)
             for i, (title, opening) in enumerate(_openings(varied, measured))
@@ -158,7 +163,7 @@ def sweep(rows: Sequence[Row], name: str) -> Html:
         class_="sweep",
         aria_label=f"Sweep: {name}",
         id="s",
-    )  # fmt: skip
+    )
 
 
 def _openings(varied: Sequence[Dimension], measured: Sequence[Measure]) -> list[tuple[str, dict[str, str]]]:
@@ -189,26 +194,38 @@ def _explorer(
     opening: Mapping[str, str],
 ) -> Html:
     dims, both = [d.name for d in varied], [d.name for d in varied] + [m.name for m in measured]
-    choices = (("Across", "x", both), ("Up", "y", [m.name for m in measured]), ("Colour", "series", dims),
-               ("A plot for each", "facet", ["", *dims]))  # fmt: skip
+    choices = (
+        ("Across", "x", both),
+        ("Up", "y", [m.name for m in measured]),
+        ("Colour", "series", dims),
+        ("A plot for each", "facet", ["", *dims]),
+    )
     pickers = [
-        tag("label", tag("span", text), tag("select",
-            *(tag("option", name or "(one plot)", value=name, selected=name == opening[role]) for name in names),
-            data_role=role))
+        tag(
+            "label",
+            tag("span", text),
+            tag(
+                "select",
+                *(tag("option", name or "(one plot)", value=name, selected=name == opening[role]) for name in names),
+                data_role=role,
+            ),
+        )
         for text, role, names in choices
-    ]  # fmt: skip
+    ]
     return tag(
         "section",
         tag("h2", title),
-        tag("figure",
+        tag(
+            "figure",
             tag("div", *pickers, class_="tools script"),
             tag("div", data_role="filters", class_="tools script"),
             tag("div", data_role="legend", class_="legend script"),
             tag("div", data_role="plots", class_="plot panels script"),
-            tag("figcaption", _CAPTION)),
+            tag("figcaption", _CAPTION),
+        ),
         class_="explorer",
         id=prefix,
-    )  # fmt: skip
+    )
 
 
 def _table(
@@ -228,8 +245,10 @@ def _table(
     made = tag("table", tag("thead", tag("tr", *heads)), tag("tbody", *rows), class_="sortable")
     lost = None
     if failed:
-        lines = [tag("tr", tag("td", _named(row), class_="text"), tag("td", str(row.get("reason")), class_="text"))
-                 for row in failed]  # fmt: skip
+        lines = [
+            tag("tr", tag("td", _named(row), class_="text"), tag("td", str(row.get("reason")), class_="text"))
+            for row in failed
+        ]
         head = tag("tr", tag("th", "point", scope="col"), tag("th", "reason", scope="col", class_="text"))
         lost = tag(
             "div", tag("h3", "Not measured"), scroll(tag("table", tag("thead", head), tag("tbody", *lines)), "Lost")

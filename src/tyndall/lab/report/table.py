@@ -31,15 +31,23 @@ def table(study: Study, prefix: str) -> Html:
     top = tag("tr", tag("td"), *(tag("th", name, colspan=n, scope="colgroup") for name, n in groups))
     heads = [tag("th", tag("button", "technique", type="button"), scope="col", aria_sort="none")]
     heads += [
-        tag("th", tag("button", column.name, type="button", aria_label=f"{column.group}, {column.name}: sort"),
-            scope="col", aria_sort="none")
+        tag(
+            "th",
+            tag("button", column.name, type="button", aria_label=f"{column.group}, {column.name}: sort"),
+            scope="col",
+            aria_sort="none",
+        )
         for column in columns
-    ]  # fmt: skip
+    ]
     rows = [
-        tag("tr", tag("th", tag("i", class_=f"swatch k{i % COLOURS}", aria_hidden="true"), result.label, scope="row"),
-            *(_cell(column.texts[i], column.values[i], i in column.best) for column in columns), data_result=i)
+        tag(
+            "tr",
+            tag("th", tag("i", class_=f"swatch k{i % COLOURS}", aria_hidden="true"), result.label, scope="row"),
+            *(_cell(column.texts[i], column.values[i], i in column.best) for column in columns),
+            data_result=i,
+        )
         for i, result in enumerate(study.results)
-    ]  # fmt: skip
+    ]
     made = tag("table", tag("thead", top, tag("tr", *heads)), tag("tbody", *rows), class_="sortable")
     return tag(
         "section",
@@ -88,11 +96,16 @@ def _times(study: Study) -> list[_Column]:
             "p95": [t.p95 if t else None for t in found],
         }
         columns += [
-            _Column(group, name, values, [_text(v, 1) for v in values],
-                    _best("less", study, values) if name == "median" else frozenset())
+            _Column(
+                group,
+                name,
+                values,
+                [_text(v, 1) for v in values],
+                _best("less", study, values) if name == "median" else frozenset(),
+            )
             for name, values in parts.items()
             if any(v is not None for v in values)
-        ]  # fmt: skip
+        ]
     return columns
 
 

@@ -46,8 +46,14 @@ def study(*results: tuple[str, float | None, float | None], noise: float = 0.0, 
         row: dict[str, Any] = {"label": label, "technique": label, "gpu_ms": ms, **more.get(label, {})}
         if error is not None:
             hidden = error < noise
-            row["errors"] = {"inscattered": {"rel_rmse_corrected": 0.0 if hidden else error, "rel_rmse": error,
-                                             "within_noise": hidden, "rel_rmse_limit": noise}}  # fmt: skip
+            row["errors"] = {
+                "inscattered": {
+                    "rel_rmse_corrected": 0.0 if hidden else error,
+                    "rel_rmse": error,
+                    "within_noise": hidden,
+                    "rel_rmse_limit": noise,
+                }
+            }
         rows.append(row)
     reference = {"judge": "traced", "relative_error": {"inscattered": noise}}
     return Study.model_validate(
@@ -91,10 +97,15 @@ def test_off_is_no_candidate_but_a_warning() -> None:
 def test_what_is_right_up_to_a_factor_is_said_in_one_sentence() -> None:
     found = study(("a", 0.1, 3.0), ("b", 0.2, 0.1))
     rows = [
-        r.model_copy(update={"up_to_scale": True, "errors": {"inscattered": {**r.errors["inscattered"],
-                     "scaled_rel_rmse": 0.25, "best_scale": 0.111}}, "model": "paper"})
+        r.model_copy(
+            update={
+                "up_to_scale": True,
+                "errors": {"inscattered": {**r.errors["inscattered"], "scaled_rel_rmse": 0.25, "best_scale": 0.111}},
+                "model": "paper",
+            }
+        )
         for r in found.results[:1]
-    ]  # fmt: skip
+    ]
     said = plain(" ".join(remarks(found.model_copy(update={"results": [*rows, found.results[1]]}))))
     assert "Right up to a factor only: a (times 0.11 it is 25 % off)." in said
     assert "paper’s own units" in said
