@@ -94,7 +94,8 @@ def test_the_wheel_holds_every_shader_and_the_command(tmp_path: Path) -> None:
     with zipfile.ZipFile(wheel) as archive:
         names = set(archive.namelist())
         entry_points = archive.read(f"tyndall-{tyndall.__version__}.dist-info/entry_points.txt").decode()
-    shaders = {path.relative_to(ROOT / "src").as_posix() for path in (ROOT / "src").rglob("*.wesl")}
-    assert shaders
-    assert shaders <= names
+    suffixes = {".wesl", ".html", ".css", ".js"}
+    assets = [path for path in (ROOT / "src").rglob("*") if path.suffix in suffixes]
+    assert {path.suffix for path in assets} == suffixes
+    assert {path.relative_to(ROOT / "src").as_posix() for path in assets} <= names
     assert "tyndall = tyndall.__main__:main" in entry_points

@@ -60,13 +60,12 @@ def _of_comparisons(target: Path) -> str:
         folders = sorted(path.parent for path in target.glob(f"*/{FILE}")) or folders
     studies = [read(path) for path in folders]
     several = len(studies) > 1
-    parts = [
-        (
-            f"{study.scene} ({study.folder.name})" if several else study.scene,
-            comparison(study, images(study, MOST_BYTES // len(studies)), number, "h2" if several else "h1"),
-        )
-        for number, study in enumerate(studies)
-    ]
+    names = [study.scene for study in studies]
+    parts = []
+    for number, study in enumerate(studies):
+        name = study.scene if names.count(study.scene) == 1 else f"{study.scene} ({study.folder.name})"
+        drawn = images(study, MOST_BYTES // len(studies))
+        parts.append((name, comparison(study, drawn, number, "h2" if several else "h1")))
     title = f"{len(studies)} comparisons" if several else studies[0].scene
     return page(f"{title} – Tyndall", parts, ANCHORS, overview(studies) if several else None)
 

@@ -227,6 +227,8 @@ def remarks(study: Study) -> list[str]:
         winner = min(better, key=lambda n: errors[n].rank)
         losers.setdefault((winner, errors[winner].rank == errors[label].rank), []).append(label)
     for (winner, tied), beaten in losers.items():
+        if len(names) == 1 and not tied:
+            continue  # the verdict has said so
         what = "faster than" if tied else "both faster and more accurate than"
         text.append(f"{winner} is {what} {listed(beaten)}{', at an error that cannot be told apart' if tied else ''}.")
     nothing = next((errors[r.label] for r in study.results if r.technique == BASELINE and r.label in errors), None)

@@ -77,6 +77,7 @@ def test_a_front_of_two_names_the_third_as_beaten() -> None:
 def test_one_that_wins_everything() -> None:
     found = study(("a", 0.1, 0.01), ("b", 0.2, 0.02))
     assert plain(verdict(found)) == "a is the fastest of 2 techniques, and the most accurate: 0.100 ms, 1.0 % error."
+    assert remarks(found) == []
 
 
 def test_what_the_noise_hides_is_not_ranked() -> None:
