@@ -112,7 +112,7 @@ def test_colours_of_a_medium_and_its_box_are_kept() -> None:
 def test_a_beam_in_coloured_air_is_the_quadrature() -> None:
     medium = Medium((0.3, 0.2, 0.1), (0.02, 0.05, 0.3), HenyeyGreenstein(0.4))  # everywhere
     scene = Scene((props.wall(-4),), (BEAM,), props.AHEAD, medium)
-    found = draw(scene, (4, 3), few(1000))
+    found = draw(scene, (4, 3), few(600))
     seen = props.rays(scene.camera, (4, 3))
     expected = props.quadrature(scene, BEAM, (4, 3), 0, 4 * seen.stretch)
     result = z_test(found.inscattered, expected, found.inscattered_error)
@@ -336,7 +336,7 @@ for index in range(len(content["materials"])):
         row.append(list(bsdf.eval(context, si, si.to_local(mi.Vector3f(wo)))))
     value.append(row)
     si = seen([0.6, 0.0, 0.8])
-    pairs = [bsdf.sample(context, si, r[0], mi.Point2f(r[1:])) for r in random.random((4000, 3)).tolist()]
+    pairs = [bsdf.sample(context, si, r[0], mi.Point2f(r[1:])) for r in random.random((2500, 3)).tolist()]
     weights.append([list(weight) for _, weight in pairs])
     drawn.append([list(si.to_world(sample.wo)) for sample, _ in pairs])
 np.savez(folder / "found.npz", value=value, weights=weights, drawn=drawn)
@@ -370,19 +370,19 @@ BALL = PointLight((1.5, 2.0, -1.5), 12.0, radius=0.5)
 VIEW = (6, 4)  # few pixels of many samples: means are normal, as the test has them, when samples are many
 
 SCENES: dict[str, tuple[Scene, int, int]] = {  # with samples and depth
-    "surfaces only": (clear(occluded(HIGH, LAMP, SPOT)), 200, 2),
-    "directional light": (occluded(HIGH), 600, 2),
-    "point light": (occluded(LAMP), 600, 2),
-    "spot light": (occluded(SPOT), 600, 2),
-    "light with a radius": (occluded(BALL), 600, 2),
+    "surfaces only": (clear(occluded(HIGH, LAMP, SPOT)), 150, 2),
+    "directional light": (occluded(HIGH), 500, 2),
+    "point light": (occluded(LAMP), 500, 2),
+    "spot light": (occluded(SPOT), 500, 2),
+    "light with a radius": (occluded(BALL), 500, 2),
     "soft sun in coloured air": (
         occluded(DirectionalLight((0.4, -1, -0.3), 2.0, angular_diameter=0.2)).with_(
             medium=Medium((0.2, 0.1, 0.05), (0.02, 0.05, 0.1), Rayleigh(), THICK.bounds)
         ),
-        600,
+        500,
         2,
     ),
-    "multiple scattering": (occluded(HIGH), 600, 4),
+    "multiple scattering": (occluded(HIGH), 500, 4),
     "light of surfaces and sky": (glowing(), 400, 3),
 }
 
