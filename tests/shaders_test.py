@@ -9,7 +9,7 @@ import props
 import pytest
 
 from tyndall.frame import Renderer
-from tyndall.gpu.device import Gpu
+from tyndall.gpu.device import Gpu, GpuError
 from tyndall.gpu.params import fields_of
 from tyndall.lab.truth import TruthSettings, trace
 from tyndall.scene.model import (
@@ -92,7 +92,8 @@ def test_every_entry_point_compiles_and_is_used(gpu: Gpu, monkeypatch: pytest.Mo
         cast(gpu, world, [[0, 0, 0]], [[0, 0, -1]])
         blocked(gpu, world, [[0, 0, 0]], [[0, 0, -1]])
     monkeypatch.setattr("tyndall.tracing.world.STACK", 0)
-    World(gpu, scene).close()
+    with pytest.raises(GpuError, match="-2 can be followed"):
+        World(gpu, scene)
     compiled = {(key[0], entry) for key in gpu._programs for entry in key[1]}
     left = entry_points(gpu) - compiled
     assert not left, f"never compiled by a technique, the truth or rays: {sorted(left)}"

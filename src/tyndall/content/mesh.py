@@ -107,7 +107,7 @@ class Meshes:
         self.placed: dict[int, tuple[int, int]] = {}
         vertex = index = 0
         for key, mesh in meshes.items():
-            gpu.write(self.positions, mesh.positions, 12 * vertex)
+            gpu.write(self.positions, _centred(mesh), 12 * vertex)
             gpu.write(self.attributes, _attributes(mesh), 16 * vertex)
             gpu.write(self.indices, mesh.indices, 4 * index)
             self.placed[key] = (index, vertex)
@@ -120,9 +120,9 @@ class Meshes:
         for (key, mirrored), matrices in groups.items():
             mesh = meshes[key]
             stop = first + len(matrices)
-            world = np.stack(matrices)
+            world = from_origin(np.stack(matrices), np.broadcast_to(origin_of(mesh), (len(matrices), 3)))
             rows["world"][first:stop] = world.transpose(0, 2, 1)
-            rows["normal"][first:stop, :, :3] = _normal_columns(world[:, :3, :3])
+            rows["normal"][first:stop, :, :3] = normal_columns(world[:, :3, :3])
             rows["material"][first:stop] = self.material_of[key]
             first_index, first_vertex = self.placed[key]
             self._draws.append(
@@ -258,6 +258,29 @@ class Meshes:
         self._textures.clear()
 
 
+def origin_of(mesh: Mesh) -> NDArray[np.float64]:
+    """(3,) the origin of a mesh's vertices on the device: its middle, where that is far from its own origin.
+
+    Its vertices, and their products with a matrix that brings them back, would have no digits left for detail.
+    """
+    low, high = (corner.astype(np.float64) for corner in mesh.bounds)
+    middle = 0.5 * (low + high)
+    far = np.abs(middle).max() > 8 * (high - low).max()
+    return middle.astype(np.float32).astype(np.float64) if far else np.zeros(3)
+
+
+def from_origin(matrices: NDArray[np.float64], origins: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(N, 4, 4): the transforms of a mesh as those of its vertices on the device, relative to (N, 3)."""
+    moved = matrices.copy()
+    moved[:, :3, 3] += np.einsum("nij,nj->ni", matrices[:, :3, :3], origins)
+    return moved
+
+
+def _centred(mesh: Mesh) -> NDArray[np.float32]:
+    origin = origin_of(mesh)
+    return (mesh.positions.astype(np.float64) - origin).astype(np.float32) if origin.any() else mesh.positions
+
+
 def _features(material: Material) -> dict[str, bool]:
     """What a material's shader must do: a fragment of a plain one is several times as cheap."""
     return {
@@ -275,7 +298,7 @@ def _attributes(mesh: Mesh) -> NDArray[Any]:
     return packed
 
 
-def _normal_columns(world: NDArray[np.float64]) -> NDArray[np.float64]:
+def normal_columns(world: NDArray[np.float64]) -> NDArray[np.float64]:
     """(N, 3, 3): columns of the inverse transpose, scaled to 1; a flat transform's normals stand on the flat."""
     x, y, z = np.moveaxis(world, -1, 0)  # the matrix's columns
     # The cofactors are the inverse transpose times the determinant, and exist where that is 0.
@@ -284,12 +307,6 @@ def _normal_columns(world: NDArray[np.float64]) -> NDArray[np.float64]:
     sign = np.where(np.linalg.det(world) < 0, -1.0, 1.0)[:, None, None]
     scaled: NDArray[np.float64] = sign * cofactors / np.where(largest > 0, largest, 1.0)
     return scaled
-
-
-def normal_rows(linear: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(3, 3): the matrix that takes normals with it where ``linear`` takes positions, to a scale."""
-    rows: NDArray[np.float64] = _normal_columns(linear[None])[0].T
-    return rows
 
 
 def _uv_columns(texture: SceneTexture | None) -> NDArray[np.float64]:

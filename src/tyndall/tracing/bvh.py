@@ -14,7 +14,7 @@ roots, into the upper tree. What is in world space already hangs in it without a
 **Practice.** Steps are dispatched for as many clusters as were left when the host last looked: after two, four, eight
 steps and so on, since a look costs more than a few empty workgroups. Nodes are numbered in the order of the steps, so a
 child precedes its parent, and moving instances is a refit: the upper tree's nodes, step by step. Equal input gives the
-same tree on every device. Buffers beyond an adapter's limit of a binding are bound in parts. A tree deeper than the
+same tree on the same device. Buffers beyond an adapter's limit of a binding are bound in parts. A tree deeper than the
 traversal's stack (triangles of exponentially growing size) is built again by pairing neighbours on the curve, whatever
 their boxes, which has logarithmic depth.
 """
@@ -65,7 +65,14 @@ class Clustering(Closing):
     def __init__(self, gpu: Gpu, nodes: Buffer, *, leaves: int, groups: int, first_node: int) -> None:
         self._gpu, self._nodes, self._leaves, self._groups, self._first = gpu, nodes, leaves, groups, first_node
         self._buffers: list[Buffer] = []
-        made = self._buffer
+        try:
+            self._allocate(leaves)
+        except BaseException:
+            self.close()
+            raise
+
+    def _allocate(self, leaves: int) -> None:
+        gpu, made = self._gpu, self._buffer
         self._keys = [made(f"keys{i}", 8 * leaves, "vec2u").split(write=True) for i in range(2)]
         self._values = [made(f"order{i}", 4 * leaves, "u32").split(write=True) for i in range(2)]
         self._counts = made("digits", 64 * -(-leaves // _BLOCK), "u32")

@@ -51,6 +51,7 @@ def cast(
     rays = pack_rays(gpu, origins, directions, near, far)
     hits = gpu.dtype("package::tracing::rays::RayHit")
     with (
+        gpu.buffer("tracing.count", np.array([len(rays), 0, 0, 0], np.uint32), owner=OWNER, usage="uniform") as count,
         gpu.buffer("tracing.rays", rays, owner=OWNER, element=f"{_MODULE}::CastRay") as rays_in,
         gpu.buffer(
             "tracing.hits", max(1, len(rays)) * hits.itemsize, owner=OWNER, element="package::tracing::rays::RayHit"
@@ -60,7 +61,7 @@ def cast(
             world.bindings,
             rays=rays_in,
             hits=out.read_write(),
-            ray_count=gpu.constant(len(rays)),
+            ray_count=count.uniform(),
             cull=gpu.constant(int(cull)),
         ).dispatch_line(len(rays))
         found = gpu.read_buffer(out)[: len(rays)].copy()
@@ -74,11 +75,12 @@ def blocked(
     """(N,) whether anything lies in each ray's way; arguments and errors as :func:`cast`."""
     rays = pack_rays(gpu, origins, directions, near, far)
     with (
+        gpu.buffer("tracing.count", np.array([len(rays), 0, 0, 0], np.uint32), owner=OWNER, usage="uniform") as count,
         gpu.buffer("tracing.rays", rays, owner=OWNER, element=f"{_MODULE}::CastRay") as rays_in,
         gpu.buffer("tracing.answers", 4 * max(1, len(rays)), owner=OWNER) as out,
     ):
         gpu.compute("tracing.cast", _MODULE, "cast_occluded").bind(
-            world.bindings, rays=rays_in, answers=out.read_write(), ray_count=gpu.constant(len(rays))
+            world.bindings, rays=rays_in, answers=out.read_write(), ray_count=count.uniform()
         ).dispatch_line(len(rays))
         found: NDArray[np.bool_] = gpu.read_buffer(out)[: len(rays)] != 0
     gpu.forget_groups()

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tyndall.content.mesh import normal_rows
+from tyndall.content.mesh import from_origin, normal_columns, origin_of
 from tyndall.scene.model import Scene, box_corners
 
 MAX_GROUPS = 1 << 16  # the group is the upper half of a key's second word
@@ -35,6 +35,7 @@ class Layout:
         hanging: rows of ``instances`` that are leaves of the upper tree.
         boxes: ``build::Box`` of each group, in its own space.
         box: world's box of everything.
+        origins: (N, 3) where each instance's mesh has the origin of its vertices on the device.
         leaves: triangles in all groups.
         groups: how many groups hold triangles.
     """
@@ -44,6 +45,7 @@ class Layout:
     hanging: NDArray[np.uint32]
     boxes: NDArray[Any]
     box: NDArray[Any]
+    origins: NDArray[np.float64]
     leaves: int
     groups: int
 
@@ -68,70 +70,78 @@ def arrange(
         movable: give every mesh a group of its own.
     """
     number = {key: i for i, key in enumerate(placed)}
+    count = len(scene.instances)
+    origins = np.array([origin_of(i.mesh) for i in scene.instances], np.float64).reshape(count, 3)
+    matrices = from_origin(np.array([i.transform for i in scene.instances], np.float64).reshape(count, 4, 4), origins)
+    flat = is_flat(matrices)
     uses = Counter(id(instance.mesh) for instance in scene.instances)
     groups: dict[int, int] = {}
-    of_instance = []
-    for instance in scene.instances:
+    of_instance = np.zeros(count + 1, np.int64)
+    for i, instance in enumerate(scene.instances):
         key = id(instance.mesh)
-        shared = (movable or uses[key] > 1) and not is_flat(np.asarray(instance.transform))
-        own = key in groups or len(groups) < MAX_GROUPS - 1
-        of_instance.append(groups.setdefault(key, 1 + len(groups)) if shared and own else 0)
+        if (movable or uses[key] > 1) and not flat[i] and (key in groups or len(groups) < MAX_GROUPS - 1):
+            of_instance[i] = groups.setdefault(key, 1 + len(groups))
 
-    count = len(scene.instances)
-    instances = np.zeros(count + 1, dtypes["Placed"])
-    lower, upper = np.full((1 + len(groups), 3), np.inf), np.full((1 + len(groups), 3), -np.inf)
     parts: dict[tuple[int, int], tuple[Any, ...]] = {}
-    for i, (instance, group) in enumerate(zip(scene.instances, of_instance, strict=True)):
-        place(instances[i], np.asarray(instance.transform), group)
-        mesh = instance.mesh
-        to_group = np.eye(4) if group else np.asarray(instance.transform)
+    lower, upper = np.full((1 + len(groups), 3), np.inf), np.full((1 + len(groups), 3), -np.inf)
+    turned = np.linalg.det(matrices[:, :3, :3]) < 0
+    for i, instance in enumerate(scene.instances):
+        group, mesh = int(of_instance[i]), instance.mesh
         part = (group, 0 if group else i)
         if part in parts:
             continue
+        low, high = (corner - origins[i] for corner in mesh.bounds)
+        to_group = np.eye(4) if group else matrices[i]
         flags = MASKED * (mesh.material.alpha_mode == "mask") | DOUBLE_SIDED * mesh.material.double_sided
-        flags |= PLACED if group else i | FLIPPED * bool(np.linalg.det(to_group[:3, :3]) < 0)
-        first = placed[id(mesh)][0] // 3
-        parts[part] = (to_group[:3], 0, first, number[id(mesh)], flags, group, mesh.triangle_count)
-        low, high = (corner.astype(np.float64) for corner in mesh.bounds)
+        flags |= PLACED if group else i | FLIPPED * int(turned[i])
+        parts[part] = (to_group[:3], placed[id(mesh)][0] // 3, number[id(mesh)], flags, group, mesh.triangle_count)
         corners = box_corners(low, high) @ to_group[:3, :3].T + to_group[:3, 3]
         lower[group] = np.minimum(lower[group], corners.min(axis=0))
         upper[group] = np.maximum(upper[group], corners.max(axis=0))
 
-    place(instances[count], np.eye(4), 0)
-    instances[count]["in_world"] = 1
+    instances = np.zeros(count + 1, dtypes["Placed"])
+    instances["group"] = of_instance
+    instances["in_world"][count] = 1
+    place(instances, np.concatenate([matrices, np.eye(4)[None]]))
     ordered = [parts[key] for key in sorted(parts)]
     rows = np.zeros(max(1, len(ordered)), dtypes["Part"])
     leaves = 0
-    for row, (to_group, _, first, mesh_number, flags, group, triangles) in zip(rows, ordered, strict=False):
+    for row, (to_group, first, mesh_number, flags, group, triangles) in zip(rows, ordered, strict=False):
         row["to_group"], row["first"], row["first_triangle"] = to_group, leaves, first
         row["mesh"], row["flags"], row["group"] = mesh_number, flags, group
         leaves += triangles
     boxes, box = np.zeros(len(lower), dtypes["Box"]), np.zeros(1, dtypes["Box"])
     boxes["lower"], boxes["upper"] = np.where(lower <= upper, lower, 0), np.where(lower <= upper, upper, 0)
     box["lower"][0], box["upper"][0] = scene.bounds
-    hanging = [i for i, group in enumerate(of_instance) if group]
     in_world = any(group == 0 for group, _ in parts)
+    hanging = np.flatnonzero(of_instance[:count]).tolist() + [count] * in_world
     return Layout(
         parts=rows,
         instances=instances,
-        hanging=np.array(hanging + [count] * in_world, np.uint32),
+        hanging=np.array(hanging, np.uint32),
         boxes=boxes,
         box=box,
+        origins=origins,
         leaves=leaves,
         groups=len(groups) + in_world,
     )
 
 
-def place(row: Any, matrix: NDArray[np.float64], group: int) -> None:
-    """Fill in a ``rays::Placed`` for a 4×4 transform; of a flat one the way back is left at zero."""
-    row["to_world"], row["group"] = matrix[:3], group
-    row["normal"][:, :3] = normal_rows(matrix[:3, :3])
-    if not is_flat(matrix):
-        row["to_local"] = np.linalg.inv(matrix)[:3]
+def place(rows: NDArray[Any], matrices: NDArray[np.float64]) -> None:
+    """Fill in ``rays::Placed`` rows, (N,), for transforms (N, 4, 4) of vertices as they are on the device. Of a flat
+    one the way back stays zero.
+    """
+    rows["to_world"] = matrices[:, :3]
+    rows["normal"][..., :3] = normal_columns(matrices[:, :3, :3]).transpose(0, 2, 1)
+    back = ~is_flat(matrices)
+    to_local = np.zeros_like(rows["to_local"])
+    to_local[back] = np.linalg.inv(matrices[back])[:, :3]
+    rows["to_local"] = to_local
 
 
-def is_flat(matrix: NDArray[np.float64]) -> bool:
-    """Whether a 4×4 transform has no inverse, so that no ray can be brought into its mesh's space."""
-    linear = matrix[:3, :3]
-    volume = float(np.prod(np.linalg.norm(linear, axis=0)))
-    return not abs(float(np.linalg.det(linear))) > _FLATTEST * volume
+def is_flat(matrices: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(N,) whether transforms (N, 4, 4) have no inverse, so that no ray can be brought into their meshes' space."""
+    linear = matrices[:, :3, :3]
+    volume = np.prod(np.linalg.norm(linear, axis=1), axis=1)
+    flat: NDArray[np.bool_] = ~(np.abs(np.linalg.det(linear)) > _FLATTEST * volume)
+    return flat

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tyndall.content.mesh import MAPS, Meshes
+from tyndall.content.mesh import MAPS, Meshes, from_origin
 from tyndall.gpu.device import Gpu, GpuError
 from tyndall.gpu.params import ParameterError
 from tyndall.gpu.resources import Buffer, Closing, Parts, Resource
@@ -61,6 +61,7 @@ class World(Closing):
             self._upload()
             self.build()
         except BaseException:
+            gpu.discard()  # passes that were recorded for what is freed now
             self.close()
             raise
 
@@ -86,6 +87,7 @@ class World(Closing):
         self._parts = self._buffer("parts", layout.parts, f"{_BUILD}::Part")
         self._hanging = self._buffer("hanging", layout.hanging)
         self._box = self._buffer("box", layout.box, f"{_BUILD}::Box")
+        self._starts = self._buffer("starts", 4 * (len(layout.hanging) + 1))
         self.bindings: dict[str, Any] = {
             "trace_root": self._root.read().declaring(
                 TRACE_INSTANCED=layout.instanced,
@@ -144,18 +146,27 @@ class World(Closing):
             "group_boxes": self._boxes.read(),
             "trace_positions": meshes.positions.split("f32"),
         }
-        lower = self._cluster(layout.leaves, layout.groups, 0, "triangle", scope, self._finish_groups)
+        # The upper tree takes no more than its logarithm where it is made by pairs; the lower ones have the rest.
+        room = STACK - 2
+        least = max(1, len(layout.hanging) - 1).bit_length() + 3
+        lower = self._cluster(layout.leaves, layout.groups, 0, "triangle", scope, self._finish_groups, room - least)
+        layout.instances["root"] = gpu.read_buffer(self._roots)[layout.instances["group"]]
+        gpu.write(self._instances, layout.instances)
         self._scope = {
             **self.bindings,
             "group_boxes": self._box.read(),
             "hanging": self._hanging.read(),
-            "instances": self._instances.read_write(),
-            "roots": self._roots.read(),
+            "instances": self._instances.read(),
             "root_boxes": self._boxes.read(),
+            "starts": self._starts.read(),
         }
-        first = layout.leaves - layout.groups
-        self._upper = self._cluster(len(layout.hanging), 1, first, "instance", self._scope, self._finish_top)
-        self.depth = lower.depth + self._upper.depth
+        first, room = layout.leaves - layout.groups, room - lower.depth
+        upper = self._cluster(len(layout.hanging), 1, first, "instance", self._scope, self._finish_top, room)
+        self.depth = lower.depth + upper.depth
+        if self.depth > STACK - 2:
+            raise GpuError(f"tracing: a tree of {self.depth} levels; {STACK - 2} can be followed")
+        gpu.write(self._starts, np.array(upper.starts, np.uint32))
+        self._upper = upper
 
     def _cluster(
         self,
@@ -165,12 +176,15 @@ class World(Closing):
         kind: str,
         scope: Mapping[str, Any],
         finish: Callable[[Parts], object],
+        room: int,
     ) -> Steps:
+        """Make the trees of one level, no deeper than ``room`` if pairing can do it."""
+        triangles = {"trace_triangles": self._triangles.split(write=True)} if kind == "triangle" else {}
         with Clustering(self._gpu, self._nodes, leaves=leaves, groups=groups, first_node=first) as clustering:
             clustering.sort(f"{kind}_keys", scope)
-            scope = {**scope, "trace_triangles": self._triangles.split(write=True)} if kind == "triangle" else scope
+            scope = {**scope, **triangles}
             clusters, steps = clustering.cluster(f"{kind}_leaves", scope)
-            if steps.depth > STACK // 2:
+            if steps.depth > room:
                 clusters, steps = clustering.cluster(f"{kind}_leaves", scope, paired=True)
             finish(clusters)
             self._gpu.submit()
@@ -192,9 +206,10 @@ class World(Closing):
     # --- motion ---------------------------------------------------------------------------------------------------
 
     def move(self, transforms: Mapping[int, Mat4]) -> None:
-        """Place instances anew: recorded before the rays of the same frame, without a new build.
+        """Place instances anew, without a new build: for rays that are recorded from now on.
 
-        The upper tree keeps its shape; after long ways :meth:`build` makes it a better one.
+        What was recorded before is submitted first. The upper tree keeps its shape; after long ways :meth:`build` makes
+        it a better one. Only rays see the motion: what a frame draws stays where the scene has it.
 
         Args:
             transforms: 4×4 (row-major, column vectors) by the instance's index in the scene.
@@ -202,35 +217,37 @@ class World(Closing):
         Raises:
             ParameterError: no such instance, one that is part of world space (see ``movable``), or a flat transform.
         """
-        layout = self._layout
-        hanging = {int(i) for i in layout.hanging}
+        gpu, layout = self._gpu, self._layout
         count = len(layout.instances) - 1
-        matrices = {}
-        for index, transform in transforms.items():
+        for index in transforms:
             if not 0 <= index < count:
                 raise ParameterError(f"instances[{index}]: there are {count}")
-            if index not in hanging:
+            if not layout.instances["group"][index]:
                 raise ParameterError(f"instances[{index}]: is placed once; World(…, movable=True) lets it move")
+        if not transforms:
+            return
+        indices = np.array(list(transforms))
+        matrices = np.empty((len(indices), 4, 4))
+        for i, (index, transform) in enumerate(transforms.items()):
             matrix = np.asarray(transform, np.float64)
-            if matrix.shape != (4, 4) or not np.isfinite(matrix).all() or is_flat(matrix):
+            if matrix.shape != (4, 4) or not np.isfinite(matrix).all() or is_flat(matrix[None])[0]:
                 raise ParameterError(
                     f"instances[{index}]: the transform is not 4×4 finite numbers that have an inverse"
                 )
-            matrices[index] = matrix
-        # The device keeps each instance's root, which it has written itself: only what is before it is replaced.
-        size, kept = layout.instances.itemsize, layout.instances.dtype.fields["root"][1]  # type: ignore[index]
-        for index, matrix in matrices.items():
-            row = layout.instances[index]
-            place(row, matrix, int(row["group"]))
-            self._gpu.write(self._instances, np.frombuffer(row.tobytes()[:kept], np.uint8), size * index)
-        if self._upper is None:
-            return
-        gpu = self._gpu
-        scope = {**self._scope, "trace_nodes": self._nodes.split(write=True)}
-        for first, end in itertools.pairwise(self._upper.starts):
-            gpu.compute("tracing.refit", _BUILD, "refit").bind(
-                scope, first_node=gpu.constant(first), node_end=gpu.constant(end)
-            ).dispatch_line(end - first)
+            matrices[i] = matrix
+        if gpu.recording:
+            gpu.submit()
+        rows = layout.instances[indices]
+        place(rows, from_origin(matrices, layout.origins[indices]))
+        layout.instances[indices] = rows
+        first, end = int(indices.min()), int(indices.max()) + 1
+        gpu.write(self._instances, layout.instances[first:end], layout.instances.itemsize * first)
+        assert self._upper is not None, "a world with instances has a tree"
+        refit = {**self._scope, "trace_nodes": self._nodes.split(write=True)}
+        for step, (start, stop) in enumerate(itertools.pairwise(self._upper.starts)):
+            gpu.compute("tracing.refit", _BUILD, "refit").bind(refit, step=gpu.constant(step)).dispatch_line(
+                stop - start
+            )
 
     # --- life -----------------------------------------------------------------------------------------------------
 
@@ -244,7 +261,9 @@ class World(Closing):
         return [*self._buffers, *(self._meshes.resources() if self._own_meshes else ())]
 
     def close(self) -> None:
-        """Free all device memory."""
+        """Free all device memory, once what was recorded has been submitted."""
+        if self._gpu.recording:
+            self._gpu.submit()
         for buffer in self._buffers:
             buffer.destroy()
         self._buffers.clear()
