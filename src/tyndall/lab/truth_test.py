@@ -234,10 +234,10 @@ BLINDS = Scene(
 
 
 def runs(gpu: Gpu, samples: int, filter: str) -> tuple[np.ndarray, np.ndarray]:
-    """In-scattered light and its standard error, (12 seeds, 9, 12, 3), of shafts through blinds."""
+    """In-scattered light and its standard error, (8 seeds, 9, 12, 3), of shafts through blinds."""
     made = [
         traced(gpu, BLINDS, TruthSettings(target=0, samples=samples, seed=seed, filter=filter), (12, 9))
-        for seed in range(12)
+        for seed in range(8)
     ]
     return np.stack([m.inscattered for m in made]), np.stack([m.inscattered_error for m in made])
 
@@ -249,15 +249,15 @@ def test_the_standard_error_is_the_spread_over_seeds(gpu: Gpu, filter: str) -> N
     planned, planned_error = runs(gpu, 1024, filter)
     for light, error in ((even, even_error), (planned, planned_error)):
         spread = light.var(axis=0, ddof=1)
-        # 3564 samples of a variance, but the channels of a pixel and pixels of a shaft's edge go together.
-        assert spread.sum() / np.square(error).mean(axis=0).sum() == pytest.approx(1, abs=0.25)
-        z = (light - light.mean(axis=0)) / np.where(error > 1e-4, error, np.inf) * np.sqrt(12 / 11)
+        # Thousands of samples of a variance, but the channels of a pixel and pixels of a shaft's edge go together.
+        assert spread.sum() / np.square(error).mean(axis=0).sum() == pytest.approx(1, abs=0.3)
+        z = (light - light.mean(axis=0)) / np.where(error > 1e-4, error, np.inf) * np.sqrt(8 / 7)
         assert 0.8 < z[error > 1e-4].std() < 2.0
     # Student's t of 16 batches has a standard deviation of 1.07.
     assert z[planned_error > 1e-4].std() < 1.3
     assert planned_error.mean() < 0.4 * even_error.mean()
     off = (planned - even).mean(axis=(0, 3))
-    error = np.sqrt((np.square(even_error) + np.square(planned_error)).sum(axis=0).mean(axis=-1)) / 12
+    error = np.sqrt((np.square(even_error) + np.square(planned_error)).sum(axis=0).mean(axis=-1)) / 8
     assert abs(off.mean()) < 4 * np.sqrt(np.square(error).sum()) / error.size
 
 
@@ -297,7 +297,7 @@ def test_a_white_cloud_in_white_light_cannot_be_seen(gpu: Gpu, medium: Medium) -
     """Scattering without absorption conserves light: radiance is 1 everywhere."""
     cloud = dataclasses.replace(medium, bounds=((-0.7, -0.5, -2.6), (0.6, 0.8, -1.4)))
     scene = Scene([], [], props.AHEAD, cloud, background=(1, 1, 1))
-    found = traced(gpu, scene, TruthSettings(target=0, samples=512, depth=48), (8, 6))
+    found = traced(gpu, scene, TruthSettings(target=0, samples=256, depth=24), (8, 6))
     assert found.inscattered.max() > 0.2
     assert_light(found.radiance, found.radiance_error, np.ones((6, 8, 3)), 1e-3)
 
