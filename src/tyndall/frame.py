@@ -121,6 +121,7 @@ class Renderer(Closing):
         self._world: World | None = None
         self._frame = 0
         self._history = 0
+        self._casters = True
         self._previous: NDArray[np.float64] | None = None
         self._camera_seen: Camera | None = None
         self._camera_row: Any = None
@@ -190,11 +191,17 @@ class Renderer(Closing):
         self._views[family] = View(
             self.gpu, self.scene, self.size, owner, made, self._images, make_world=lambda: self.world
         )
+        if self._world and not self._casts_rays():
+            self._world.close()
+            self._world = None
         return made
+
+    def _casts_rays(self) -> bool:
+        return any(view.technique.casts_rays for view in self._views.values())
 
     @property
     def world(self) -> World:
-        """The scene for rays; built when it is asked for first."""
+        """The scene for rays; built when it is asked for first, and freed by :meth:`use` once no technique casts any."""
         if self._world is None:
             self._world = World(self.gpu, self.scene, meshes=self._content[0])
         return self._world
@@ -226,6 +233,10 @@ class Renderer(Closing):
 
     def _record(self, camera: Camera, jitter: bool, casters: bool) -> None:
         gpu, images = self.gpu, self._images
+        if self._casts_rays():
+            _ = self.world  # its build submits what is recorded, so it comes first
+        if casters != self._casters:
+            self._casters, self._history = casters, 0
         self._update(camera, jitter)
         scope = self._scope
 

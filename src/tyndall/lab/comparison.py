@@ -22,6 +22,7 @@ from tyndall.lab.metrics import Scores
 from tyndall.lab.picture import OutputError, Picture, check_folder, encode_png, write_layers
 from tyndall.lab.stage import Still
 from tyndall.lab.standard import KINDS, LAYERS, SYMBOLS, Standard
+from tyndall.techniques import FAMILIES
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -82,8 +83,9 @@ class Result:
 
     @property
     def memory_bytes(self) -> int:
-        """Bytes that the technique itself holds on the device."""
-        return self.measurement.bytes_of(self.family)
+        """Bytes that the technique itself holds on the device, the tree included where it casts rays."""
+        tree = FAMILIES[self.family].members[self.technique].casts_rays
+        return self.measurement.bytes_of(self.family) + (self.measurement.bytes_of("tracing") if tree else 0)
 
     @property
     def main(self) -> Scores | None:

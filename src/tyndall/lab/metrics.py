@@ -169,9 +169,11 @@ def rel_rmse(image: Light, reference: Light, error: Light | None = None) -> floa
 def hidden(image: Light, reference: Light, error: Light) -> tuple[float, bool] | None:
     """The largest relative RMSE that a picture may have, and whether it may have none: both by three standard errors.
 
-    Each pixel gives one estimate of the mean square error, ``mean((x − r)² − se²)`` over its channels. Their scatter
-    gives the standard error of their mean, whatever the noise's distribution, as the noise of pixels is independent.
-    None where the reference is black, or has no noise after all.
+    Each pixel gives one estimate of the mean square error, ``mean((x − r)² − se²)`` over its channels, and the noise of
+    pixels is independent. Two things bound the standard error of their mean, and the smaller one is taken: their
+    scatter, whatever the noise's distribution, in which a picture's own uneven error counts too; and what noise that is
+    normal adds to an error ``δ``, of variance ``4 δ² se² + 2 se⁴``, with the channels taken for one. None where the
+    reference is black, or has no noise after all.
     """
     x, r = _pair(image, reference)
     mean, noise = float(r.mean()), np.square(error, dtype=np.float64)
@@ -179,7 +181,9 @@ def hidden(image: Light, reference: Light, error: Light) -> tuple[float, bool] |
         return None
     squares = np.mean((x - r) ** 2 - noise, axis=-1)
     left = float(squares.mean())
-    uncertain = 3 * float(squares.std()) / math.sqrt(squares.size)
+    scatter = float(squares.std()) / math.sqrt(squares.size)
+    normal = np.mean(4 * np.maximum((x - r) ** 2 - noise, 0) * noise + 2 * noise**2, axis=-1)
+    uncertain = 3 * min(scatter, math.sqrt(float(normal.sum())) / squares.size)
     return math.sqrt(max(0.0, left) + uncertain) / mean, left < uncertain
 
 

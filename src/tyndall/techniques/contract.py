@@ -32,12 +32,14 @@ class Technique:
         paper: who described it, and when.
         advice: one honest line on when to use it.
         reads_maps: whether it reads the shadow maps themselves, beyond asking for visibility.
+        casts_rays: whether it asks :attr:`View.world`; the frame then builds it before it records anything.
     """
 
     name: ClassVar[str]
     paper: ClassVar[str]
     advice: ClassVar[str]
     reads_maps: ClassVar[bool] = False
+    casts_rays: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         check(self)

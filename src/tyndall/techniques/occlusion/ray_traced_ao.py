@@ -25,6 +25,7 @@ class RayTracedAo(Technique):
 
     name: ClassVar[str] = "ray_traced_ao"
     paper: ClassVar[str] = "Zhukov 1998, An ambient light illumination model; Landis 2002"
+    casts_rays: ClassVar[bool] = True
     advice: ClassVar[str] = "Corners and contacts darken as under a grey sky; noisy for some frames after each change."
 
     radius: float = param(1.0, 1e-6, None, "distance within which surfaces block the ambient light", unit="m")

@@ -38,6 +38,7 @@ class RayTraced(Technique):
 
     name: ClassVar[str] = "ray_traced"
     paper: ClassVar[str] = "Appel 1968, Some techniques for shading machine renderings of solids; Cook 1984 (soft)"
+    casts_rays: ClassVar[bool] = True
     advice: ClassVar[str] = "Exact for any light, scene and scale, and soft where a light has a radius; costs rays."
 
     samples: int = param(1, 1, 256, "rays a pixel, frame and light with a radius")
