@@ -35,9 +35,9 @@ independent, and the scatter of their means gives the standard error of the whol
 known to about ``1/sqrt(2·(batches − 1))`` of itself; there are 16 batches or more if ``samples`` and ``seconds`` allow
 it.
 
-**A pilot** of 64 samples finds out which part of each camera ray each light reaches, and which pixels scatter. The
-batches then put most of their samples there (never all), and the pilot is forgotten: what depends on it is only where
-samples go, not what they say, so the mean has no bias.
+**A pilot** of 64 samples, or fewer where ``seconds`` are short, finds out which part of each camera ray each light
+reaches, and which pixels scatter. The batches then put most of their samples there (never all), and the pilot is
+forgotten: what depends on it is only where samples go, not what they say, so the mean has no bias.
 
 **The error that stops** is :meth:`Truth.relative_error`, of radiance and of in-scattered light alike, summed on the
 device. **The cache** keeps truths by content (scene, size, depth, filter, seed, and the code that took part), under
