@@ -6,7 +6,7 @@ READY := .venv/.ready
 .PHONY: demo test lint types unit format lock clean
 
 demo: $(READY)
-	.venv/bin/tyndall compare box --size 640x360 --out out/demo
+	.venv/bin/tyndall compare box --size 320x180 --out out/demo --report
 
 test: lint types unit
 
