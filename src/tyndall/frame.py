@@ -201,7 +201,7 @@ class Renderer(Closing):
 
     @property
     def world(self) -> World:
-        """The scene for rays; built when it is asked for first, and freed by :meth:`use` once no technique casts any."""
+        """The scene for rays; built when it is asked for first, freed by :meth:`use` once no technique casts any."""
         if self._world is None:
             self._world = World(self.gpu, self.scene, meshes=self._content[0])
         return self._world
