@@ -2,9 +2,12 @@
 
 A technique that takes a few random samples a pixel and frame keeps their mean in an image, and in the next frame reads
 it where the surface was (Nehab 2007; the picture's motion vectors). What it finds there counts if it was of the same
-surface: of like depth and normal, each of four neighbours by itself. While the camera stands still, a pixel's mean is
-that of all frames since then, so it converges to the truth; while it moves, the mean looks back as far as the technique
-says, since each look between pixels blurs.
+surface: of like depth and normal, each of four neighbours by itself.
+
+While the camera moves, the mean looks back as far as the technique says, since each look between pixels blurs. Once the
+camera has stood still for three frames, what was gathered on the move counts as four frames, those three among them;
+from then on a pixel's mean is that of all frames, and it converges to the truth. Of a camera that has not moved since
+the first frame, all frames count.
 
 Where there is no mean yet, the first batch of samples is larger. One sample alone would show for long: antialiasing
 takes the mean of pictures, and each of the next few holds mostly that sample.
