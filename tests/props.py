@@ -78,6 +78,39 @@ def box(low: Vec3, high: Vec3, material: Material = WHITE) -> Instance:
     return Instance(Mesh(positions, indices, face_normals(positions, indices), material=material))
 
 
+def boards(length: float, width: float, count: int, material: Material = WHITE) -> Instance:
+    """A level plane of boards along z, side by side, that faces up."""
+    x = (np.arange(count + 1) - count / 2) * width
+    far, i = count + 1, np.arange(count)
+    ends = [np.stack([x, 0 * x, np.full_like(x, z)], 1) for z in (length / 2, -length / 2)]
+    sides = [np.stack(corners, 1) for corners in ((i, i + 1, i + far + 1), (i, i + far + 1, i + far))]
+    return Instance(Mesh(np.concatenate(ends), np.concatenate(sides), material=material))
+
+
+@dataclass(frozen=True)
+class Turn:
+    """A rotation (3, 3) of a whole scene."""
+
+    matrix: Floats
+
+    def point(self, x: float, y: float, z: float) -> Vec3:
+        """A point or direction turned."""
+        a, b, c = (float(value) for value in self.matrix @ (x, y, z))
+        return a, b, c
+
+    def place(self, instance: Instance) -> Instance:
+        """A shape turned."""
+        transform = np.eye(4)
+        transform[:3, :3] = self.matrix
+        return Instance(instance.mesh, tuple(tuple(float(x) for x in row) for row in transform))  # type: ignore[arg-type]
+
+
+def turned(about_z: float, about_y: float) -> Turn:
+    """Turned about y, then about z, in radians: by odd angles nothing lies along an axis."""
+    c, s, cy, sy = math.cos(about_z), math.sin(about_z), math.cos(about_y), math.sin(about_y)
+    return Turn(np.array([[c, -s, 0], [s, c, 0], [0, 0, 1.0]]) @ np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]]))
+
+
 def face_normals(positions: Floats, indices: NDArray[Any]) -> Floats:
     """The normals (V, 3) of flat faces that share no vertices."""
     a, b, c = (positions[indices[:, i]] for i in range(3))

@@ -6,6 +6,9 @@ rays a frame whose density is the cosine's, and their mean over frames is kept
 (:mod:`tyndall.techniques.accumulation`). Nothing fades towards the radius: a surface counts whole or not at all. Where
 it is infinite against the scene, a uniform sky's light is exact for one bounce.
 
+Bumps of a normal map hide nothing: the hemisphere is that of the shading normal, and what of it lies below the triangle
+is mirrored up by it. So an open surface is open whatever its normals, as a facet of a smooth solid is.
+
 It multiplies the ambient light only; the lights' own shadows are the shadow technique's.
 """
 
