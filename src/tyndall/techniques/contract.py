@@ -186,7 +186,9 @@ class Visibility:
         module: a WESL module with ``fn visibility(light: u32, position: vec3f, normal: vec3f) -> f32``, for any point;
             the normal is zero in the air.
         surfaces: a WESL module with ``fn surface_visibility(light: u32, pixel: vec2u, position: vec3f, normal: vec3f)
-            -> f32``, for what a pixel shows.
+            -> f32``, for what a pixel shows, and ``fn towards_light(light: u32, position: vec3f, normal: vec3f) ->
+            vec3f``, the unit direction for which the surface's reflection of the light is taken: that to its centre,
+            or above it where the horizon cuts the light and the technique knows what it leaves.
         bindings: what these modules import from ``package::bindings``.
         maps: the shadow maps, a depth layer per map (reversed-Z; 0 where nothing was drawn); None only where none are
             wanted.

@@ -2,14 +2,19 @@
 
 A ray from what a pixel shows towards a light says whether the light reaches it (Appel 1968): exact for the scene's
 triangles, with no map whose texels or depth could be too coarse. A light with a radius is seen as a cone of directions,
-``sin θ = r/d``, and visibility is the part of the cone that is open. It is estimated by ``samples`` rays a frame with
-directions even in solid angle (Shirley 1996, section 3), and their mean over frames is kept
+``sin θ = r/d``, and visibility is the part of its irradiance that nothing hides. It is estimated by ``samples`` rays a
+frame whose density is the cosine to the surface's normal (``wesl/horizon.wesl``), and their mean over frames is kept
 (:mod:`tyndall.techniques.accumulation`). The samples are low-discrepancy points in time and across the picture
 (``wesl/screen_sequence.wesl``). As the light shrinks to a point, the rays close up to the single ray of a hard shadow.
 
-The answer for a pixel is weighted by the light's irradiance and the reflection for the light's centre, as for every
-shadow technique; so a light's radius softens shadows, but not highlights. Where shading normals bend far from the
-facets, the facets' own shade shows at the terminator, as it does in the traced reference.
+The answer for a pixel is weighted by the light's irradiance and its reflection from one direction, that of the light's
+centre, as for every shadow technique; so a light's radius softens shadows, but not highlights. Where the horizon cuts
+the light, the direction lies above the centre's by as much as makes the irradiance right (Snyder 1996): a matte surface
+fades over the whole width of the light, as in the traced reference, and not to nothing as the centre sets. Only a light
+that the horizon cuts and that is hidden in part besides is not exact: the samples are not quite even along the horizon,
+which is at most 1 % of the irradiance of a surface that faces the light, and 2.5 % if the light fills much of the sky.
+Where shading normals bend far from the facets, the facets' own shade shows at the terminator, as it does in the traced
+reference.
 
 Points in the air are answered by a ray as well (``air="rays"``): exact, one ray for each of a volumetric technique's
 samples, for a light with a radius to a random point of it. ``air="map"`` leaves the air to shadow maps
