@@ -15,23 +15,26 @@ _MEASURING = frozenset({"frames", "warmup", "seconds", "seed", "metrics"})
 
 
 def table(rows: Sequence[Mapping[str, Any]], notes: Sequence[str] = ()) -> Table:
-    """One line a point, by rich."""
+    """One line a point, by rich. Names and reasons hold brackets that are no markup of rich's."""
     from rich import box
     from rich.table import Table
+    from rich.text import Text
 
     points = [_point(row) for row in rows]
     varied = _varied(points)
     common = {name: value for name, value in (points[0] if points else {}).items() if name not in varied}
     title = " · ".join(_text(common[name]) for name in ("scene", "size", "technique") if name in common)
-    made = Table(title=title, caption="\n".join(notes), caption_justify="left", box=box.SIMPLE_HEAD, padding=0)
+    caption = Text("\n".join(notes), "table.caption")
+    made = Table(title=Text(title, "table.title"), caption=caption, caption_justify="left", box=box.SIMPLE_HEAD, padding=0)
     made.show_edge = False
     for name in varied:
-        made.add_column(name, no_wrap=True)
+        made.add_column(Text(name), no_wrap=True)
     for heading in ("GPU ms", "p95", "shadow ms", "frame ms", "host ms", "MiB", "L_v rel. RMSE", "bias"):
         made.add_column(heading, justify="right", no_wrap=True)
     for row, point in zip(rows, points, strict=True):
         own = [_text(point.get(name)) for name in varied]
-        made.add_row(*own, *(_figures(row) if row["status"] == "done" else [row["status"], *7 * ["–"]]))
+        cells = [*own, *(_figures(row) if row["status"] == "done" else [row["status"], *7 * ["–"]])]
+        made.add_row(*map(Text, cells))
     return made
 
 

@@ -11,6 +11,7 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -346,6 +347,18 @@ def test_a_row_is_flat_in_a_table() -> None:
     }
     columns = columns_of([{"a": 1, "b": "x"}, {"a": 2.5}, {"b": 3, "c": None}])
     assert columns == {"a": [1.0, 2.5, None], "b": ["x", None, "3"], "c": [None, None, None]}
+
+
+def test_brackets_in_names_and_reasons_are_shown_as_they_are(tmp_path: Path, log: Path) -> None:
+    names = ["y[red].json", "z[dim].json"]
+    for name in names:
+        save(Scene(), tmp_path / name)
+    paths = [str(tmp_path / name) for name in names]
+    found = sweep({"scenes": paths, "techniques": "off"}, tmp_path / "out", workers=0, work=sweep_work.quick)
+    shown = str(replace(found, notes=("pip install 'tyndall[sweep]'", "[/x]")))
+    assert all(text in shown for text in (*names, "pip install 'tyndall[sweep]'", "[/x]"))
+    one = sweep({"scenes": paths[0], "techniques": "off"}, tmp_path / "one", workers=0, work=sweep_work.quick)
+    assert names[0] in str(one), "in the title"
 
 
 def test_parquet_holds_the_rows(tmp_path: Path, log: Path) -> None:
