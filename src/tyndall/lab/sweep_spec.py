@@ -430,9 +430,12 @@ def _truth(value: Any) -> Plain | None:
     judge = given.pop("judge", None) or "none"
     if judge not in JUDGES:
         raise ParameterError(f"no judge '{judge}'{nearest(str(judge), JUDGES)} (there are {', '.join(JUDGES)})")
-    if judge == "none":
-        return None
     wrong = _Gathered()
+    if judge == "none":
+        for name in given:
+            wrong.note(name, "is a setting of a judge, and the judge is 'none'")
+        wrong.raise_any()
+        return None
     made: Plain = {"judge": judge}
     if judge == "march" and "shadow" in given:
         chosen = wrong.at("shadow", _choice("shadow"), given.pop("shadow"))

@@ -171,6 +171,7 @@ def test_every_mistake_is_named_at_once(tmp_path: Path) -> None:
         ({"scenes": "box", "techniques": 3}, "techniques: 3 is neither the name of a technique nor an object"),
         ({"scenes": "box", "truth": "marsh"}, "truth: no judge 'marsh' — did you mean 'march'?"),
         ({"scenes": "box", "truth": {"judge": "march", "secnds": 1}}, "truth.secnds: no such setting"),
+        ({"scenes": "box", "truth": {"judge": "none", "target": 1}}, "truth.target: is a setting of a judge, and"),
         ({"scenes": "box", "truth": {"judge": "traced", "filter": "box"}}, "truth: filter: the rays of still frames"),
         ({"scenes": "box", "metrics": "most"}, "metrics: 'most' is not one of 'all', 'light'"),
         ({"scenes": "box", "seed": 2**32}, "seed: 4.29497e+09 is outside"),
