@@ -185,7 +185,7 @@ def _ending(rows: Sequence[Row]) -> list[str]:
         found = dict.fromkeys(row[name] for row in rows if row.get(name))
         if len(found) > 1:
             notes.append(f"the rows come from {len(found)} {words}: {', '.join(found)}")
-    found = dict.fromkeys(row["versions"]["tyndall"] for row in rows if row.get("versions"))
+    found = dict.fromkeys(v["tyndall"] for row in rows if (v := row.get("versions")) and "tyndall" in v)
     if len(found) > 1:
         notes.append(f"the rows come from {len(found)} versions of Tyndall: {', '.join(found)}")
     return notes

@@ -14,6 +14,7 @@ import json
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from types import NoneType
 from typing import Any, Literal
 
 from tyndall.gpu.params import ParameterError
@@ -26,6 +27,7 @@ Row = Mapping[str, Any]
 Format = Literal["parquet", "csv"]
 
 RESULTS = "results.jsonl"
+_OBJECTS = ("gpu_ms", "shadow_ms", "frame_ms", "host_ms", "errors", "versions")  # of a row that is done, where known
 _TECHNIQUES = ("technique", *FAMILIES)  # the fields of a point that describe a technique
 
 
@@ -108,11 +110,21 @@ def append(file: int, data: bytes) -> None:
 
 
 def _parsed(line: bytes) -> Row | None:
+    """The row in a line; None where that is no whole row, one with all that is read of it later."""
     try:
         row = json.loads(line)
-    except ValueError:
+    except (ValueError, RecursionError):
         return None
-    return row if isinstance(row, dict) and isinstance(row.get("id"), str) and "status" in row else None
+    if not (isinstance(row, dict) and isinstance(row.get("id"), str) and isinstance(row.get("point"), dict)):
+        return None
+    reason = row.get("reason")
+    if row.get("status") == "done":
+        whole = isinstance(row.get("memory_bytes"), (int, float)) and all(
+            isinstance(row.get(name), (dict, NoneType)) for name in _OBJECTS
+        )
+    else:
+        whole = row.get("status") in ("failed", "unsupported") and isinstance(reason, str)
+    return row if whole else None
 
 
 def table_format(asked: Format | None) -> Format:

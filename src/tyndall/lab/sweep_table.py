@@ -23,9 +23,10 @@ def table(rows: Sequence[Mapping[str, Any]], notes: Sequence[str] = ()) -> Table
     points = [_point(row) for row in rows]
     varied = _varied(points)
     common = {name: value for name, value in (points[0] if points else {}).items() if name not in varied}
-    title = " · ".join(_text(common[name]) for name in ("scene", "size", "technique") if name in common)
+    title = Text(" · ".join(_text(common[name]) for name in ("scene", "size", "technique") if name in common))
     caption = Text("\n".join(notes), "table.caption")
-    made = Table(title=Text(title, "table.title"), caption=caption, caption_justify="left", box=box.SIMPLE_HEAD, padding=0)
+    title.stylize("table.title")
+    made = Table(title=title, caption=caption, caption_justify="left", box=box.SIMPLE_HEAD, padding=0)
     made.show_edge = False
     for name in varied:
         made.add_column(Text(name), no_wrap=True)
@@ -58,7 +59,7 @@ def _varied(points: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def _figures(row: Mapping[str, Any]) -> list[str]:
-    light = (row["errors"] or {}).get("inscattered", {})
+    light = (row.get("errors") or {}).get("inscattered", {})
     gpu, shadow, frame, host = (row.get(name) or {} for name in ("gpu_ms", "shadow_ms", "frame_ms", "host_ms"))
     error = light.get("rel_rmse_corrected", light.get("rel_rmse"))
     return [

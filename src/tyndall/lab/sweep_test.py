@@ -94,6 +94,20 @@ def test_damage_in_the_middle_costs_its_own_line_only(tmp_path: Path, log: Path)
     assert "2 lines of results.jsonl are no rows, and are passed over" in found.notes
 
 
+@pytest.mark.parametrize("lost", ["point", "status", "memory_bytes"])
+def test_a_row_without_what_is_read_of_it_is_damage(lost: str, tmp_path: Path, log: Path) -> None:
+    sweep(spec([1, 2]), tmp_path, workers=0, work=sweep_work.quick)
+    path = tmp_path / "results.jsonl"
+    first, second = path.read_text().splitlines()
+    row = json.loads(first)
+    del row[lost]
+    path.write_text(f"{json.dumps(row)}\n{second}\n")
+    found = sweep(spec([1, 2]), tmp_path, workers=0, work=sweep_work.quick)
+    assert heights(found.rows) == [1, 2]
+    assert measured(log) == {1: 2, 2: 1}
+    assert "1 lines of results.jsonl are no rows, and are passed over" in found.notes
+
+
 def test_two_runs_at_once_in_one_folder_are_refused(tmp_path: Path, log: Path) -> None:
     with Store(tmp_path / "out"), pytest.raises(OutputError, match="another sweep is writing there"):
         sweep(spec([1]), tmp_path / "out", workers=0, work=sweep_work.quick)
