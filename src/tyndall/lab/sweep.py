@@ -23,7 +23,7 @@ from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tyndall.gpu.device import Gpu
+from tyndall.gpu.device import Gpu, choose_adapter
 from tyndall.gpu.params import ParameterError
 from tyndall.lab.picture import write_atomically
 from tyndall.lab.sweep_point import measure_point
@@ -103,7 +103,9 @@ def sweep(
         workers: how many processes measure; more than one are Dask's. 0 measures in this process: quick to start, but
             a driver that crashes takes the caller with it.
         scheduler: address of a Dask scheduler whose workers measure, one point at a time each, instead.
-        adapter: part of an adapter's name; or a device to share, which only this process (``workers=0``) can.
+        adapter: part of an adapter's name; or a device to share, which only this process (``workers=0``) can. Points
+            that were measured on another one are measured again, but by the workers of a scheduler, whose adapters
+            are not known here. None takes rows of any adapter, and says where they are of several.
         table: "parquet" or "csv"; None is Parquet where pyarrow is installed, and CSV where it is not.
         fresh: measure everything again; the new rows take the place of the old.
         progress: hears a fraction of 1 and what is being measured.
@@ -113,6 +115,7 @@ def sweep(
     Raises:
         SweepError: the specification is wrong; one line for each mistake.
         ParameterError: a number of workers below 0, no such scheduler, or a library that is missing.
+        GpuError: this machine has no such adapter.
         OutputError: the folder cannot be written, or another sweep writes there; or it is full: what was measured
             before that is kept.
         SchedulerError: the scheduler ended during the sweep; likewise.
@@ -125,11 +128,15 @@ def sweep(
     if scheduler is not None or workers > 1:
         check_dask()
     plan = spec if isinstance(spec, Plan) else read(spec)
+    wanted = None if scheduler is not None else _device(adapter)
     with Store(out) as store:
         write_atomically(store.folder / "spec.json", lambda path: _write_json(path, plan.spec))
-        known = {} if fresh else {p.id: store.rows[p.id] for p in plan.points if _final(store.rows.get(p.id))}
+        final = set() if fresh else {p.id for p in plan.points if _final(store.rows.get(p.id))}
+        known = {id for id in final if wanted is None or store.rows[id].get("adapter") in (wanted, None)}
         notes = _beginning(plan, store, len(known), fresh)
-        run = _Run(plan, store, set(known), progress, work)
+        if final != known:
+            notes.append(f"{len(final - known)} points are measured again, now on {wanted}")
+        run = _Run(plan, store, known, progress, work)
         run.refuse()
         if isinstance(adapter, Gpu) or (not workers and scheduler is None):
             run.inline(adapter)
@@ -148,6 +155,17 @@ def sweep(
         path = save_table(rows, store.folder, kind)
         notes += _ending(rows)
         return Sweep(rows, store.folder, path, len(known), tuple(notes))
+
+
+def _device(adapter: str | Gpu | None) -> str | None:
+    """The name that rows of an adapter have; None where none was asked for.
+
+    Raises:
+        GpuError: there is no such adapter.
+    """
+    if adapter is None:
+        return None
+    return str(adapter.adapter_info["device"] if isinstance(adapter, Gpu) else choose_adapter(adapter).info["device"])
 
 
 def _final(row: Row | None) -> bool:

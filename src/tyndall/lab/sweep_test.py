@@ -19,7 +19,7 @@ import psutil
 import pytest
 import sweep_work
 
-from tyndall.gpu.device import Gpu
+from tyndall.gpu.device import Gpu, GpuError
 from tyndall.gpu.params import ParameterError
 from tyndall.lab import standard, sweep_store
 from tyndall.lab.picture import OutputError
@@ -296,6 +296,27 @@ def test_points_are_drawn_and_held_against_the_truth(gpu: Gpu, tmp_path: Path, m
     table = list(csv.DictReader(found.table_file.read_text(encoding="utf-8").splitlines()))
     assert [row["froxel.grid"] for row in table[:3]] == ["", "8x4x8", "32x18x32"]
     assert float(table[2]["gpu_ms.median"]) == fine["gpu_ms"]["median"]
+
+
+def test_a_point_of_another_adapter_is_measured_again_where_one_is_asked_for(
+    gpu: Gpu, tmp_path: Path, log: Path
+) -> None:
+    mine = gpu.adapter_info["device"]
+    sweep(spec([4, 5]), tmp_path, workers=0, work=sweep_work.quick)  # on an adapter called "none"
+    again = sweep(spec([4, 5]), tmp_path, workers=0, work=sweep_work.quick)
+    assert again.reused == 2
+    found = sweep(spec([4, 5]), tmp_path, workers=0, adapter=mine, work=sweep_work.drawn)
+    assert (found.reused, {row["adapter"] for row in found.rows}) == (0, {mine})
+    assert found.notes[0] == f"2 points are measured again, now on {mine}"
+    kept = sweep(spec([4, 5]), tmp_path, workers=0, adapter=mine, work=sweep_work.drawn)
+    assert kept.reused == 2
+    assert measured(log) == {4: 2, 5: 2}
+
+
+def test_an_adapter_that_is_not_there_is_told_even_where_nothing_is_left(tmp_path: Path, log: Path) -> None:
+    sweep(spec([4]), tmp_path, workers=0, work=sweep_work.quick)
+    with pytest.raises(GpuError, match="no adapter matches 'nowhere'"):
+        sweep(spec([4]), tmp_path, workers=0, adapter="nowhere", work=sweep_work.quick)
 
 
 def test_what_cannot_be_drawn_is_told_and_the_rest_goes_on(gpu: Gpu, tmp_path: Path) -> None:
