@@ -308,7 +308,7 @@ class Comparison:
             self.reference.save(folder)
             for result in self.results:
                 (folder / f"{result.label}-closeup.png").write_bytes(encode_png(_closeup(result, self.reference)))
-        document = json.dumps(self._json(lambda name: name), indent=2, ensure_ascii=False)
+        document = json.dumps(self._json(lambda name: name), indent=2, ensure_ascii=False, allow_nan=False)
         (folder / "results.json").write_text(document + "\n", encoding="utf-8")
 
     def _repr_html_(self) -> str:

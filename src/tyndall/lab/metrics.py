@@ -101,7 +101,7 @@ class Scores:
     def to_json(self) -> dict[str, float | bool | None]:
         """Every figure but ``missing``; JSON has no infinity, so the PSNR of equal pictures is null."""
         values = {f.name: getattr(self, f.name) for f in dataclasses.fields(self) if f.name != "missing"}
-        return {name: _rounded(value) for name, value in values.items()}
+        return {name: rounded(value) for name, value in values.items()}
 
 
 def score(image: Light, target: Target) -> Scores:
@@ -159,11 +159,12 @@ def rmse(image: Light, reference: Light) -> float:
 def rel_rmse(image: Light, reference: Light, error: Light | None = None) -> float | None:
     """:func:`rmse` over the reference's mean; None where that mean is zero, since no relative error exists then.
 
-    With the reference's standard ``error``, of the same shape, the expected square of its noise is taken off.
+    With the reference's standard ``error``, of the same shape, the expected square of its noise is taken off; None
+    where that is not finite.
     """
     x, r = _pair(image, reference)
     mean = float(r.mean())
-    return _without_noise(x - r, error) / mean if mean > 0 else None
+    return _finite(_without_noise(x - r, error) / mean) if mean > 0 else None
 
 
 def hidden(image: Light, reference: Light, error: Light) -> tuple[float, bool] | None:
@@ -173,7 +174,7 @@ def hidden(image: Light, reference: Light, error: Light) -> tuple[float, bool] |
     pixels is independent. Two things bound the standard error of their mean, and the smaller one is taken: their
     scatter, whatever the noise's distribution, in which a picture's own uneven error counts too; and what noise that is
     normal adds to an error ``δ``, of variance ``4 δ² se² + 2 se⁴``, with the channels taken for one. None where the
-    reference is black, or has no noise after all.
+    reference is black, has no noise after all, or a noise that is not known (not finite).
     """
     x, r = _pair(image, reference)
     mean, noise = float(r.mean()), np.square(error, dtype=np.float64)
@@ -184,15 +185,18 @@ def hidden(image: Light, reference: Light, error: Light) -> tuple[float, bool] |
     scatter = float(squares.std()) / math.sqrt(squares.size)
     normal = np.mean(4 * np.maximum((x - r) ** 2 - noise, 0) * noise + 2 * noise**2, axis=-1)
     uncertain = 3 * min(scatter, math.sqrt(float(normal.sum())) / squares.size)
-    return math.sqrt(max(0.0, left) + uncertain) / mean, left < uncertain
+    limit = math.sqrt(max(0.0, left) + uncertain) / mean if math.isfinite(left + uncertain) else math.nan
+    return (limit, left < uncertain) if math.isfinite(limit) else None
 
 
 def relative_noise(reference: Light, error: Light | None) -> float | None:
-    """The reference's own relative standard error, ``sqrt(mean(se²)) / m``; 0 without noise, None without light."""
+    """The reference's own relative standard error, ``sqrt(mean(se²)) / m``; 0 without noise, None without light or
+    where the error is not known (not finite).
+    """
     mean = float(np.mean(reference, dtype=np.float64))
     if mean <= 0:
         return None
-    return 0.0 if error is None else math.sqrt(float(np.mean(np.square(error, dtype=np.float64)))) / mean
+    return 0.0 if error is None else _finite(math.sqrt(float(np.mean(np.square(error, dtype=np.float64)))) / mean)
 
 
 def relmse(image: Light, reference: Light) -> float | None:
@@ -337,7 +341,7 @@ def boundary(image: Light, target: Target) -> float | None:
     if target.edges is None or not target.edges.any() or mean <= 0:
         return None
     error = None if target.error is None else target.error[target.edges]
-    return _without_noise((x - r)[target.edges], error) / mean
+    return _finite(_without_noise((x - r)[target.edges], error) / mean)
 
 
 def shadow_edges(lit: Light, unshadowed: Light, error: Light | None = None) -> NDArray[np.bool_]:
@@ -401,11 +405,15 @@ def _extreme(values: NDArray[np.float64], reach: int, which: Any) -> NDArray[np.
 
 
 def _without_noise(difference: NDArray[np.float64], error: Light | None) -> float:
-    """Root of the mean square, less the expected square of the reference's noise."""
+    """Root of the mean square, less the expected square of the reference's noise; not finite where that is not."""
     square = float(np.mean(difference**2))
     if error is not None:
         square -= float(np.mean(np.square(error, dtype=np.float64)))
-    return math.sqrt(max(0.0, square))
+    return math.sqrt(max(square, 0.0))  # max keeps its first argument where that is no number
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
 
 
 def _pair(image: NDArray[Any], reference: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -421,7 +429,8 @@ def _missing(metric: str, package: str) -> str:
     return f"{metric} is left out, as {package} is not installed: pip install 'tyndall[truth]'"
 
 
-def _rounded(value: float | bool | None) -> float | bool | None:
+def rounded(value: float | bool | None) -> float | bool | None:
+    """A figure for JSON, of six digits: None where it is not finite."""
     if value is None or isinstance(value, bool):
         return value
     return float(f"{value:.6g}") if math.isfinite(value) else None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import sys
 
@@ -327,3 +328,19 @@ def test_what_cannot_be_compared_is_refused(light: np.ndarray) -> None:
         metrics.rel_rmse(broken, light)
     with pytest.raises(ValueError, match="8-bit"):
         metrics.picture_psnr(light, light)
+
+
+@pytest.mark.parametrize("unknown", [math.nan, math.inf])
+def test_an_error_that_is_not_known_is_no_small_error(light: np.ndarray, unknown: float) -> None:
+    noise = np.full_like(light, 0.01)
+    noise[3, 4, 1] = unknown
+    edges = np.ones(light.shape[:2], bool)
+    scores = metrics.score(1.1 * light, metrics.Target(light, noise, edges))
+    assert scores.rel_rmse == pytest.approx(0.1 * math.sqrt((light**2).mean()) / light.mean(), rel=1e-3)
+    assert scores.rel_rmse_corrected is None
+    assert scores.rel_rmse_limit is None
+    assert not scores.within_noise
+    assert scores.boundary is None
+    assert scores.scaled_rel_rmse is None
+    assert metrics.relative_noise(light, noise) is None
+    json.dumps(scores.to_json(), allow_nan=False)

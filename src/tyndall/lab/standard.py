@@ -40,6 +40,7 @@ LAYERS = {"inscattered": "inscatter", "surfaces": "surfaces", "radiance": ""}  #
 # Long enough for a percent on a GPU, and short enough for a first look without one; the table says how sure it is.
 # Mitsuba has to load the scene and compile its kernels first.
 _SECONDS = {"traced": 20.0, "mitsuba": 120.0}
+_LIGHT = ("radiance", "inscattered", "radiance_error", "inscattered_error")
 
 Floats = NDArray[np.float32]
 
@@ -88,7 +89,7 @@ class Standard:
             "mean": float(np.mean(first.light, dtype=np.float64)),
             "samples": truth.samples,
             "seconds": round(truth.seconds, 3),
-            "relative_error": {kind: float(f"{error:.4g}") for kind, error in self.noise.items()},
+            "relative_error": {kind: metrics.rounded(error) for kind, error in self.noise.items()},
             "boundary_share": {
                 kind: None if t.edges is None else float(f"{t.edges.mean():.4g}") for kind, t in self.targets.items()
             },
@@ -124,7 +125,7 @@ def prepare(
         settings: when a traced one is good enough; None is :func:`default_settings`.
 
     Raises:
-        ParameterError: a truth of another size.
+        ParameterError: a truth of another size, or one that is not finite.
         MitsubaError: it is asked for, and missing or broken.
     """
     march = None
@@ -144,6 +145,10 @@ def prepare(
     if found.radiance.shape[1::-1] != tuple(stage.size):
         raise ParameterError(
             "truth: is {}×{} pixels, and the comparison {}×{}".format(*found.radiance.shape[1::-1], *stage.size)
+        )
+    if not all(np.isfinite(getattr(found, name)).all() for name in _LIGHT):
+        raise ParameterError(
+            f"truth: the light of {found.judge}, or its error, is not finite; scale the scene's lights"
         )
     full = stage.unshadowed()
     edges = _edges(stage, found, full)
@@ -234,8 +239,11 @@ def _light(truth: Truth, kind: str) -> Floats:
 def _error(truth: Truth, kind: str) -> Floats | None:
     """The standard error of a kind of light; that of the surfaces is what is left of the sum's, as if independent."""
     if kind == "surfaces":
-        square = np.square(truth.radiance_error) - np.square(truth.inscattered_error)
-        error = np.sqrt(np.maximum(0, square))
+        # Squares of dim and of bright light are beyond float32.
+        square = np.square(truth.radiance_error, dtype=np.float64) - np.square(
+            truth.inscattered_error, dtype=np.float64
+        )
+        error = np.sqrt(np.maximum(0, square)).astype(np.float32)
     else:
         error = getattr(truth, f"{kind}_error")
     return error if error.any() else None

@@ -103,6 +103,14 @@ def test_a_truth_without_surfaces_has_the_rest_of_the_picture(gpu: Gpu, made: tu
     np.testing.assert_array_equal(unknown.picture.depth, ready.picture.depth)
 
 
+def test_a_truth_that_is_not_finite_is_refused(gpu: Gpu, made: tuple[Truth, Standard]) -> None:
+    truth, _ = made
+    unknown = truth.radiance_error.copy()
+    unknown[3, 2] = np.nan
+    with Stage(post_on_a_floor(), SIZE, adapter=gpu) as stage, pytest.raises(ParameterError, match="not finite"):
+        prepare(stage, "shadow", replace(truth, radiance_error=unknown))
+
+
 def test_its_files_hold_its_light_and_its_error(made: tuple[Truth, Standard], tmp_path: Path) -> None:
     import OpenEXR
 

@@ -39,6 +39,9 @@ it.
 reaches, and which pixels scatter. The batches then put most of their samples there (never all), and the pilot is
 forgotten: what depends on it is only where samples go, not what they say, so the mean has no bias.
 
+**The unit of light** on the device is the scene's own brightness (:func:`unit_of`), a power of two, so that the squares
+of dim and of bright light alike are within the range of its 32-bit numbers.
+
 **The error that stops** is :meth:`Truth.relative_error`, of radiance and of in-scattered light alike, summed on the
 device. **The cache** keeps truths by content (scene, size, depth, filter, seed, and the code that took part), under
 ``$TYNDALL_CACHE/truth``: a truth with a smaller error serves a request for a larger one, and is where a request for a
@@ -65,7 +68,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import tyndall
-from tyndall.frame import pack_camera, pack_lights, pack_medium
+from tyndall.frame import depth_range, lights_power, pack_camera, pack_lights, pack_medium
 from tyndall.gpu.device import Gpu, GpuError
 from tyndall.gpu.params import ParameterError, check, param
 from tyndall.gpu.resources import Buffer, Closing
@@ -171,7 +174,7 @@ def trace(
 
     Raises:
         GpuError: no adapter, or a picture or scene beyond its limits.
-        ParameterError: no scene, or a size that is not in whole pixels.
+        ParameterError: no scene, a size that is not in whole pixels, or light beyond the range of 32-bit numbers.
     """
     settings = settings or TruthSettings()
     if not isinstance(scene, Scene):
@@ -198,6 +201,34 @@ def trace(
         with contextlib.suppress(OSError):  # a cache that cannot be written is no error
             _save(entry, found)
     return found
+
+
+def unit_of(scene: Scene) -> float:
+    """About the brightest light of a scene, a power of two; 1 without light. See the module.
+
+    Raises:
+        ParameterError: it is beyond the range of 32-bit numbers.
+    """
+    start, reach = depth_range(scene.camera, scene)
+    emissive = (max(instance.mesh.material.emissive) for instance in scene.instances)
+    brightest = max(lights_power(scene, reach - start), *scene.ambient, *scene.background, *emissive)
+    if brightest > float(np.finfo(np.float32).max):
+        raise _out_of_range()
+    return math.ldexp(1.0, math.frexp(brightest)[1]) if brightest > 0 else 1.0
+
+
+def _in_unit(scene: Scene, unit: float) -> Scene:
+    """The scene with all light but what surfaces emit divided by ``unit``."""
+    ambient, background = ((r / unit, g / unit, b / unit) for r, g, b in (scene.ambient, scene.background))
+    lights = []
+    for light in scene.lights:
+        r, g, b = (c * light.intensity / unit for c in light.color)
+        lights.append(dataclasses.replace(light, intensity=1.0, color=(r, g, b)))
+    return scene.with_(lights=lights, ambient=ambient, background=background)
+
+
+def _out_of_range() -> ParameterError:
+    return ParameterError("truth: light beyond the range of 32-bit numbers; scale the scene's lights")
 
 
 def _relative(square_error: float, mean: float) -> float:
@@ -289,6 +320,8 @@ def _converge(
         if count >= check_at:
             level = tracer.level()
             level = known.pooled(level) if known else level
+            if not all(math.isfinite(x) for x in (*level.light, *level.square)):
+                raise _out_of_range()
             if level.error <= settings.target:
                 break
             check_at = count + max(1, count // 8)
@@ -299,6 +332,8 @@ def _converge(
             share = min(1.0, max(share, first, all_samples, timed))
             progress(share)
     found = dataclasses.replace(tracer.result(), seconds=time.monotonic() - begin)
+    if not all(np.isfinite(x).all() for x in (found.radiance, found.radiance_error, found.inscattered_error)):
+        raise _out_of_range()
     if progress:
         progress(1.0)
     return _described(_pooled(before, found) if before else found, settings)
@@ -342,7 +377,9 @@ class _Tracer(Closing):
             self._plan = self._buffer("plan", 4 * pixels, "u32")
             self._depths = self._buffer("depths", 4 * pixels, "f32")
             self._totals = self._buffer("totals", 16 * _GROUPS, "vec4f")
-            camera = pack_camera(scene.camera, scene, size, gpu.dtype("package::wesl::camera::Camera"))
+            self._unit = unit_of(scene)
+            lit = _in_unit(scene, self._unit)
+            camera = pack_camera(scene.camera, lit, size, gpu.dtype("package::wesl::camera::Camera"))
             camera["seed"] = settings.seed
             self._world = World(gpu, scene)
             self._scope = {
@@ -353,7 +390,7 @@ class _Tracer(Closing):
                     np.array([pack_medium(scene.medium, gpu.dtype("package::wesl::medium::Medium"))]),
                     "package::wesl::medium::Medium",
                 ).uniform(),
-                "lights": self._lights(scene).read(),
+                "lights": self._lights(lit).read(),
                 "sums": self._sums.split(write=True),
                 "moments": self._moments.split(write=True),
                 "guides": self._guides.split(write=True),
@@ -365,6 +402,7 @@ class _Tracer(Closing):
             self._job = np.zeros(1, dtype)
             self._job["depth"] = settings.depth
             self._job["over_pixel"] = settings.filter == "box"
+            self._job["emission"] = 1 / self._unit
             self._job["soft"] = any(_is_soft(light) for light in scene.lights)
             self._job_buffer = self._struct("job", self._job, f"{_MODULE}::Job")
             self._scope["job"] = self._job_buffer.uniform()
@@ -491,7 +529,9 @@ class _Tracer(Closing):
         light, air, square, air_square = (float(x) / (3 * self.size[0] * self.size[1]) for x in sums)
         self._squares = 3 * (square + air_square)  # of an ordinary pixel, all channels
         scale = self._batches * (self._batches - 1)
-        return _Level(round(self._batches * self._samples), (light, air), (square / scale, air_square / scale))
+        unit = self._unit
+        lights, squares = (unit * light, unit * air), (unit**2 / scale * square, unit**2 / scale * air_square)
+        return _Level(round(self._batches * self._samples), lights, squares)
 
     def result(self) -> Truth:
         """The means and their standard errors, read back."""
@@ -499,18 +539,21 @@ class _Tracer(Closing):
         self._strips("trace_depth", 0, 1)
         width, height = self.size
         moments = self._gpu.read_buffer(self._moments).view(np.float32).reshape(height, width, 4, 4)[..., :3]
+        moments = moments.astype(np.float64)
         depth = self._gpu.read_buffer(self._depths).view(np.float32)[: width * height].reshape(height, width)
         surfaces, air = moments[..., 0, :], moments[..., 1, :]
-        scale = np.float32(1 / (self._batches * (self._batches - 1)))
+        scale = 1 / (self._batches * (self._batches - 1))
         errors = [np.sqrt(np.maximum(moments[..., i, :], 0) * scale) for i in (2, 3)]
+        with np.errstate(over="ignore"):  # who asked for it is told
+            light = [(x * self._unit).astype(np.float32) for x in (surfaces + air, air, surfaces, *errors)]
         return Truth(
             judge="traced",
-            radiance=surfaces + air,
-            inscattered=np.ascontiguousarray(air),
-            surfaces=np.ascontiguousarray(surfaces),
+            radiance=light[0],
+            inscattered=light[1],
+            surfaces=light[2],
             depth=np.where(depth < 0, np.float32(np.inf), depth),
-            radiance_error=errors[0],
-            inscattered_error=errors[1],
+            radiance_error=light[3],
+            inscattered_error=light[4],
             samples=round(self._batches * self._samples),
             seconds=0.0,
             size=self.size,

@@ -267,6 +267,38 @@ def test_another_seed_is_another_picture_and_the_same_seed_the_same(gpu: Gpu) ->
     assert not np.array_equal(a.inscattered, c.inscattered)
 
 
+@pytest.mark.parametrize("depth", [2, 3])
+def test_dim_and_bright_light_are_as_exact(gpu: Gpu, depth: int) -> None:
+    """By powers of two, as these leave the same digits; squares of light range beyond float32 on both sides."""
+    settings = TruthSettings(target=0, samples=1024, depth=depth)
+    glow = Material(emissive=(0.2, 0.1, 0.0))
+
+    def scaled(factor: float) -> Truth:
+        bulb = dataclasses.replace(BULB, intensity=BULB.intensity * factor)
+        wall = props.wall(-4, material=dataclasses.replace(glow, emissive=tuple(factor * e for e in glow.emissive)))
+        scene = Scene((wall,), (bulb,), props.AHEAD, FOG, ambient=3 * (0.1 * factor,), background=3 * (factor,))
+        return traced(gpu, scene, settings, (12, 9))
+
+    middle = scaled(1.0)
+    assert middle.relative_error("inscattered") > 1e-4
+    for power in (-70, 60, 95):
+        found = scaled(2.0**power)
+        for name in ("radiance", "inscattered", "surfaces", "radiance_error", "inscattered_error"):
+            assert getattr(found, name) * 2.0**-power == pytest.approx(getattr(middle, name), rel=1e-5, abs=1e-7)
+        for kind in ("radiance", "inscattered"):
+            assert found.relative_error(kind) == pytest.approx(middle.relative_error(kind), rel=1e-4)
+
+
+def test_light_that_no_picture_can_hold_is_said(gpu: Gpu) -> None:
+    bulb = dataclasses.replace(BULB, intensity=1e30, color=(0, 1e20, 0))
+    with pytest.raises(ParameterError, match="beyond the range"):
+        trace(Scene((props.wall(-4),), (bulb,), props.AHEAD, FOG), (12, 9), QUICK, gpu=gpu, cache=False)
+    # The light itself is within it, what the wall reflects is not: the lamp is a decimetre off.
+    near = PointLight((0, 0, -3.9), 1e30, (1e8, 1e8, 1e8))
+    with pytest.raises(ParameterError, match="beyond the range"):
+        trace(Scene((props.wall(-4),), (near,), props.AHEAD, FOG), (3, 3), QUICK, gpu=gpu, cache=False)
+
+
 def test_it_stops_when_it_is_good_enough(gpu: Gpu) -> None:
     heard: list[float] = []
     coarse, fine = (
