@@ -44,6 +44,11 @@ def drawn(task: Mapping[str, Any]) -> dict[str, Any]:
     return {**FIGURES, "adapter": task["adapter"]}
 
 
+def littered(task: Mapping[str, Any]) -> dict[str, Any]:
+    """What lies in the folder for temporary files meanwhile."""
+    return {**FIGURES, "folders": sorted(path.name for path in Path(os.environ["TMPDIR"]).iterdir())}
+
+
 def slow(task: Mapping[str, Any]) -> dict[str, Any]:
     """Takes a fifth of a second."""
     _log(task)

@@ -8,6 +8,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from collections import Counter
 from collections.abc import Sequence
@@ -169,7 +170,10 @@ def test_a_killed_run_loses_a_point_a_worker_and_goes_on(workers: int, tmp_path:
         "from tyndall.lab.sweep import sweep\n"
         f"sweep({spec(range(1, 13))!r}, {str(tmp_path / 'out')!r}, workers={workers}, work=sweep_work.slow)\n"
     )
-    process = subprocess.Popen([sys.executable, "-c", program], env=_environment(), stderr=subprocess.PIPE)
+    scratch = tmp_path / "tmp"
+    scratch.mkdir()
+    environment = {**_environment(), "TMPDIR": str(scratch)}
+    process = subprocess.Popen([sys.executable, "-c", program], env=environment, stderr=subprocess.PIPE)
     rows = tmp_path / "out/results.jsonl"
     deadline = time.monotonic() + 60
     while not (rows.exists() and rows.read_bytes().count(b"\n") >= 4):
@@ -181,6 +185,7 @@ def test_a_killed_run_loses_a_point_a_worker_and_goes_on(workers: int, tmp_path:
     while any(psutil.pid_exists(int(path.suffix[1:])) for path in log.parent.glob("log.*")):
         assert time.monotonic() < deadline, "workers end with their parent"
         time.sleep(0.02)
+    assert not list(scratch.iterdir()), "and leave nothing"
     with Store(tmp_path / "out") as store:
         kept = set(heights(list(store.rows.values())))
     before = measured(log)
@@ -208,6 +213,16 @@ def test_a_worker_that_dies_is_tried_once_more_and_then_reported(workers: int, t
     assert "the worker died (signal 9)" in str(found)
     again = sweep(spec([1, 2, 3, 4, 5]), tmp_path, workers=0, work=sweep_work.quick)
     assert (again.failed, again.reused) == ([], 4)
+
+
+def test_workers_leave_no_folders_behind(tmp_path: Path, log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    scratch = tmp_path / "tmp"
+    scratch.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(scratch))
+    monkeypatch.setenv("TMPDIR", str(scratch))
+    seen = sweep(spec([2, 3]), tmp_path / "out", workers=2, work=sweep_work.littered)
+    assert any(row["folders"] for row in seen.rows), "there were some"
+    assert not list(scratch.iterdir())
 
 
 def test_workers_of_a_scheduler_that_exists_are_used(tmp_path: Path, log: Path) -> None:

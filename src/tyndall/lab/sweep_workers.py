@@ -17,6 +17,7 @@ import itertools
 import json
 import logging
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -237,9 +238,9 @@ class _DaskWorker(Worker):
 class _LocalWorker(_DaskWorker):
     """A process of ours that is a worker of our scheduler."""
 
-    def __init__(self, client: Any, scheduler: str) -> None:
+    def __init__(self, client: Any, scheduler: str, folder: str) -> None:
         super().__init__(client)
-        self._scheduler = scheduler
+        self._told = json.dumps([scheduler, folder])
         self._process = _Process(_DASK)
         self._known: tuple[subprocess.Popen[str], str] | None = None
 
@@ -249,7 +250,7 @@ class _LocalWorker(_DaskWorker):
             assert process.stdin is not None
             assert process.stdout is not None
             try:
-                process.stdin.write(self._scheduler + "\n")
+                process.stdin.write(self._told + "\n")
                 process.stdin.flush()
                 address = process.stdout.readline().strip()
             except (OSError, ValueError):
@@ -350,7 +351,9 @@ def local_workers(count: int) -> Iterator[list[tuple[Worker, int]]]:
         "distributed.comm.timeouts.connect": "30s",
     }
     with contextlib.ExitStack() as stack:
-        stack.enter_context(dask.config.set(settings))
+        # Dask's own files, ours to remove, since workers are killed.
+        folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="tyndall-", ignore_cleanup_errors=True))
+        stack.enter_context(dask.config.set({**settings, "temporary-directory": folder}))
         # Zero workers of its own; what would be its dashboard answers nothing, on a port of the loopback interface.
         cluster = stack.enter_context(
             parts.LocalCluster(
@@ -363,7 +366,7 @@ def local_workers(count: int) -> Iterator[list[tuple[Worker, int]]]:
             )
         )
         client = stack.enter_context(parts.Client(cluster, set_as_default=False))
-        workers = [_LocalWorker(client, cluster.scheduler_address) for _ in range(count)]
+        workers = [_LocalWorker(client, cluster.scheduler_address, folder) for _ in range(count)]
         for worker in workers:
             stack.callback(worker.end)
         yield list(zip(workers, itertools.count()))
@@ -402,9 +405,10 @@ def remote_workers(address: str) -> Iterator[list[tuple[Worker, int]]]:
 
 
 def serve() -> None:
-    """The side of a process of :func:`local_workers`: reads the scheduler's address, writes its own, and works."""
-    address = sys.stdin.readline().strip()
-    end_with_parent()
+    """The side of a process of :func:`local_workers`: reads the scheduler's address and a folder, writes its address,
+    and works."""
+    scheduler, folder = json.loads(sys.stdin.readline())
+    end_with_parent(folder)
 
     async def work() -> None:
         import dask
@@ -412,29 +416,29 @@ def serve() -> None:
 
         parts: Any = distributed
 
-        with tempfile.TemporaryDirectory(prefix="tyndall-") as folder:
-            with dask.config.set({"distributed.worker.http.routes": []}):
-                process = parts.Worker(
-                    address,
-                    nthreads=1,
-                    host="127.0.0.1",
-                    dashboard=False,
-                    dashboard_address="127.0.0.1:0",
-                    local_directory=folder,
-                    memory_limit=0,
-                )
-            async with process:
-                print(process.address, flush=True)
-                await process.finished()
+        with dask.config.set({"distributed.worker.http.routes": []}):
+            process = parts.Worker(
+                scheduler,
+                nthreads=1,
+                host="127.0.0.1",
+                dashboard=False,
+                dashboard_address="127.0.0.1:0",
+                local_directory=folder,
+                memory_limit=0,
+            )
+        async with process:
+            print(process.address, flush=True)
+            await process.finished()
 
     asyncio.run(work())
 
 
-def end_with_parent() -> None:
-    """End this process when its input closes, at once: nothing of it is of use to anyone then."""
+def end_with_parent(folder: str) -> None:
+    """End this process when its input closes, at once, and remove a folder: they are of use to nobody then."""
 
     def wait() -> None:
         sys.stdin.read()
+        shutil.rmtree(folder, ignore_errors=True)
         os._exit(1)
 
     threading.Thread(target=wait, daemon=True).start()
