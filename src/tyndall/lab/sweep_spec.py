@@ -93,11 +93,6 @@ class MarchSettings:
 JUDGES = (*standard.JUDGES, "none")
 
 
-def judge_settings(judge: str) -> type:
-    """The declared settings of a judge."""
-    return MarchSettings if judge == "march" else TruthSettings
-
-
 @dataclass(frozen=True)
 class Point:
     """One measurement, as plain data: what travels to a worker.
@@ -409,10 +404,12 @@ def _parameters(value: Any) -> dict[str, dict[str, tuple[Any, ...]]]:
     return {n: v for n, v in made.items() if v is not None}
 
 
-def _settings(cls: type, values: Mapping[str, Any]) -> Plain:
-    """All declared values of a set of parameters, those of ``values`` changed."""
+def _settings(judge: str, values: Mapping[str, Any]) -> Plain:
+    """All declared settings of a judge, those of ``values`` changed. Where no time limit is given, it is that of a
+    comparison: a thousand points must not wait for the first's truth without end."""
     wrong = _Gathered()
-    known = {f.name: f for f in fields_of(cls)}
+    defaults = MarchSettings() if judge == "march" else standard.default_settings(judge)
+    known = {f.name: f for f in fields_of(type(defaults))}
 
     def check(name: str, value: Any) -> Any:
         if name not in known:
@@ -421,7 +418,7 @@ def _settings(cls: type, values: Mapping[str, Any]) -> Plain:
 
     changed = {name: wrong.at(name, partial(check, name), value) for name, value in values.items()}
     wrong.raise_any()
-    return {name: changed.get(name, f.default) for name, f in known.items()}
+    return {name: changed.get(name, getattr(defaults, name)) for name in known}
 
 
 def _truth(value: Any) -> Plain | None:
@@ -444,11 +441,10 @@ def _truth(value: Any) -> Plain | None:
         elif chosen is not None:
             one = {name: values[0] for name, values in chosen.values.items()}
             made["shadow"] = _plain(replace(MEMBERS[chosen.name](), one))
-    cls = judge_settings(judge)
-    made |= wrong.over(partial(_settings, cls), given) or {}
+    made |= wrong.over(partial(_settings, judge), given) or {}
     wrong.raise_any()
     if judge != "march":
-        standard.check("volumetric", judge, cls(**{f.name: made[f.name] for f in fields_of(cls)}))
+        standard.check("volumetric", judge, TruthSettings(**{f.name: made[f.name] for f in fields_of(TruthSettings)}))
     return made
 
 

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from tyndall.lab import sweep_spec
+from tyndall.lab.standard import default_settings
 from tyndall.lab.sweep_spec import SweepError, plan, read
 from tyndall.scene.files import save
 from tyndall.scene.model import DirectionalLight, PointLight, Scene
@@ -100,6 +101,7 @@ def test_a_judge_has_all_of_its_settings() -> None:
     assert point["truth"]["judge"] == "traced"
     assert point["truth"]["target"] == 0.02
     assert point["truth"]["depth"] == 2
+    assert point["truth"]["seconds"] == default_settings("traced").seconds > 0, "as a comparison's"
     shadow = {"technique": "shadow_map", "size": 4096}
     (point,) = descriptions({"scenes": "box", "techniques": "off", "truth": {"judge": "march", "shadow": shadow}})
     assert point["truth"]["shadow"]["size"] == 4096
