@@ -180,7 +180,8 @@ def judge(
     Args:
         size: width and height in pixels.
         settings: as for :func:`tyndall.lab.truth.trace`.
-        variant: one of :data:`VARIANTS`; None takes the best that works, and another where that one fails on the way.
+        variant: one of :data:`VARIANTS`; None takes the best that works, and another where that one fails on the way;
+            it logs a warning for each that does not work.
         progress: hears a fraction of 1, an estimate.
 
     Returns:
@@ -203,6 +204,7 @@ def judge(
     first = available()
     if first.variant is None:
         raise MitsubaError(first.failures[-1])
+    _warn(first)
     failures = []
     for name in VARIANTS[VARIANTS.index(first.variant.name) :]:
         try:
@@ -211,6 +213,13 @@ def judge(
             failures.append(str(error))
             log.warning(str(error))
     raise MitsubaError(failures[0])
+
+
+@cache
+def _warn(found: Availability) -> None:
+    """Once: what does not work may be a hundred times as fast as what does."""
+    for line in found.failures:
+        log.warning(line)
 
 
 def _render(

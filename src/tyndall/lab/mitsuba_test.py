@@ -493,12 +493,17 @@ def test_another_variant_takes_over(monkeypatch: pytest.MonkeyPatch, caplog: pyt
             raise MitsubaError(f"Mitsuba's {chosen.name} failed: signal SIGABRT")
         return chosen.name
 
-    monkeypatch.setattr(mitsuba, "available", lambda: mitsuba.Availability(variant("llvm_ad_rgb"), ()))
+    found = mitsuba.Availability(variant("llvm_ad_rgb"), ("Mitsuba's cuda_ad_rgb failed: no driver",))
+    monkeypatch.setattr(mitsuba, "available", lambda: found)
     monkeypatch.setattr(mitsuba, "_try", variant)
     monkeypatch.setattr(mitsuba, "_render", render)
     with caplog.at_level(logging.WARNING, "tyndall"):
         assert judge(Scene(), (4, 4)) == "scalar_rgb"
-    assert "llvm_ad_rgb failed" in caplog.text
+        assert "cuda_ad_rgb failed: no driver" in caplog.text
+        assert "llvm_ad_rgb failed" in caplog.text
+        caplog.clear()
+        judge(Scene(), (4, 4))
+    assert "no driver" not in caplog.text, "once is enough"
 
 
 def test_a_crash_and_a_silence_are_told() -> None:
