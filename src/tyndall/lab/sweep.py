@@ -25,6 +25,7 @@ from typing import TYPE_CHECKING, Any
 
 from tyndall.gpu.device import Gpu, choose_adapter
 from tyndall.gpu.params import ParameterError
+from tyndall.lab.mitsuba import MitsubaError, available
 from tyndall.lab.picture import write_atomically
 from tyndall.lab.sweep_point import measure_point
 from tyndall.lab.sweep_spec import Plan, Point, SweepError, read
@@ -102,7 +103,8 @@ def sweep(
         out: folder for the results.
         workers: how many processes measure; more than one are Dask's. 0 measures in this process: quick to start, but
             a driver that crashes takes the caller with it.
-        scheduler: address of a Dask scheduler whose workers measure, one point at a time each, instead.
+        scheduler: address of a Dask scheduler whose workers measure, one point at a time each, instead; ``workers``
+            is 1 then.
         adapter: part of an adapter's name; or a device to share, which only this process (``workers=0``) can. Points
             that were measured on another one are measured again, but by the workers of a scheduler, whose adapters
             are not known here. None takes rows of any adapter, and says where they are of several.
@@ -114,7 +116,9 @@ def sweep(
 
     Raises:
         SweepError: the specification is wrong; one line for each mistake.
-        ParameterError: a number of workers below 0, no such scheduler, or a library that is missing.
+        ParameterError: a number of workers below 0 or beside a scheduler, no such scheduler, or a library that is
+            missing.
+        MitsubaError: a point that is left needs Mitsuba, and it does not run here; nothing was measured.
         GpuError: this machine has no such adapter.
         OutputError: the folder cannot be written, or another sweep writes there; or it is full: what was measured
             before that is kept.
@@ -122,7 +126,9 @@ def sweep(
     """
     if workers < 0 or isinstance(workers, bool):
         raise ParameterError(f"workers: {workers} is fewer than 0")
-    if isinstance(adapter, Gpu) and (workers or scheduler):
+    if scheduler is not None and workers != 1:
+        raise ParameterError(f"workers: {workers}; a scheduler has its own workers, and all of them measure")
+    if isinstance(adapter, Gpu) and (workers or scheduler is not None):
         raise ParameterError("adapter: a device is not shared with other processes; workers=0 measures in this one")
     kind = table_format(table)
     if scheduler is not None or workers > 1:
@@ -138,6 +144,8 @@ def sweep(
             notes.append(f"{len(final - known)} points are measured again, now on {wanted}")
         run = _Run(plan, store, known, progress, work)
         run.refuse()
+        if scheduler is None and run.needs("mitsuba") and (mitsuba := available()).variant is None:
+            raise MitsubaError(str(mitsuba))
         if isinstance(adapter, Gpu) or (not workers and scheduler is None):
             run.inline(adapter)
         elif run.left:
@@ -224,6 +232,10 @@ class _Run:
     def left(self) -> int:
         """How many points are not measured yet."""
         return self._total - self._done
+
+    def needs(self, judge: str) -> bool:
+        """Whether errors of a point that is left are against this judge."""
+        return any((point.description["truth"] or {}).get("judge") == judge for point in self._waiting)
 
     def refuse(self) -> None:
         """Rows for the points whose technique refuses their scene."""

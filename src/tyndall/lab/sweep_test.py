@@ -23,6 +23,7 @@ import sweep_work
 from tyndall.gpu.device import Gpu, GpuError
 from tyndall.gpu.params import ParameterError
 from tyndall.lab import standard, sweep_store
+from tyndall.lab.mitsuba import Availability, MitsubaError, Variant
 from tyndall.lab.picture import OutputError
 from tyndall.lab.sweep import sweep
 from tyndall.lab.sweep_store import Store, columns_of, flat
@@ -263,11 +264,27 @@ def test_a_sweep_listens_on_the_loopback_interface_alone() -> None:
 def test_mistakes_of_the_call_are_told(gpu: Gpu, tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match="workers: -1 is fewer than 0"):
         sweep(spec([1]), tmp_path, workers=-1)
+    with pytest.raises(ParameterError, match="workers: 2; a scheduler has its own"):
+        sweep(spec([1]), tmp_path, workers=2, scheduler="tcp://127.0.0.1:9")
     with pytest.raises(ParameterError, match="a device is not shared with other processes"):
         sweep(spec([1]), tmp_path, adapter=gpu)
     with pytest.raises(ParameterError, match="format: 'xls'"):
         sweep(spec([1]), tmp_path, table="xls")  # type: ignore[arg-type]
     assert not list(tmp_path.iterdir())
+
+
+def test_a_judge_that_is_missing_is_told_once_and_before_any_point(
+    tmp_path: Path, log: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    missing = Availability(None, ("Mitsuba is not installed: pip install 'tyndall[truth]'",))
+    monkeypatch.setattr("tyndall.lab.sweep.available", lambda: missing)
+    asked = {**spec([1, 2]), "truth": "mitsuba"}
+    with pytest.raises(MitsubaError, match="Mitsuba is not installed"):
+        sweep(asked, tmp_path, workers=0, work=sweep_work.quick)
+    assert not measured(log)
+    assert heights(sweep(spec([1, 2]), tmp_path, workers=0, work=sweep_work.quick).rows) == [1, 2]
+    monkeypatch.setattr("tyndall.lab.sweep.available", lambda: Availability(Variant("scalar_rgb", None, "3"), ()))
+    assert heights(sweep(asked, tmp_path, workers=0, work=sweep_work.quick).rows) == [1, 2]
 
 
 # --- what is measured -----------------------------------------------------------------------------------------------
