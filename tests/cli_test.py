@@ -108,6 +108,8 @@ def test_doctor_finds_an_adapter_to_draw_with(capsys: pytest.CaptureFixture[str]
     code, out, err = run(capsys, "doctor")
     assert (code, err) == (0, "")
     assert report["adapters"][0]["name"] in out
+    words = " ".join(out.split())
+    assert all(f"{name} {version or 'missing (pip install'}" in words for name, version in report["extras"].items())
 
 
 def test_doctor_fails_where_the_wanted_adapter_is_missing(capsys: pytest.CaptureFixture[str]) -> None:

@@ -30,6 +30,14 @@ LIMITS = {
     "max-buffer-size": "bytes in one buffer",
 }
 PACKAGES = ("tyndall", "wgpu", "wesl-py", "rendercanvas", "numpy", "pydantic", "typer", "rich", "pillow", "OpenEXR")
+# Optional packages, and what installs them. Mitsuba is tried, and has a line of its own.
+EXTRAS = {
+    "flip-evaluator": "truth",
+    "scikit-image": "truth",
+    "dask": "sweep",
+    "distributed": "sweep",
+    "pyarrow": "sweep",
+}
 
 
 @dataclass(frozen=True)
@@ -57,6 +65,7 @@ class Report:
     Attributes:
         adapters: every adapter that answers, best first.
         missing: one line per problem, with its remedy; not each keeps Tyndall from drawing.
+        extras: optional packages by version, None for one that is not installed.
         mitsuba: the variant of Mitsuba that can judge pictures here, and why no better one; or how to get it.
     """
 
@@ -65,6 +74,7 @@ class Report:
     python: str
     system: str
     packages: Mapping[str, str | None]
+    extras: Mapping[str, str | None]
     missing: tuple[str, ...]
 
     @property
@@ -90,6 +100,7 @@ class Report:
             "python": self.python,
             "system": self.system,
             "packages": dict(self.packages),
+            "extras": dict(self.extras),
             "missing": list(self.missing),
         }
 
@@ -113,6 +124,8 @@ class Report:
             parts += [table, Text()]
         parts.append(Text.from_markup(f"[bold]Python[/] {self.python} on {self.system}"))
         parts.append(Text(", ".join(f"{name} {version or 'missing'}" for name, version in self.packages.items())))
+        optional = [f"{name} {version or _get(name)}" for name, version in self.extras.items()]
+        parts.append(Text(f"optional: {', '.join(optional)}"))
         parts.append(Text(f"truth by another renderer: {self.mitsuba}"))
         parts += [Text.from_markup(f"[yellow]![/] {escape(line)}") for line in self.missing]
         verdict = "[green]Tyndall can draw here.[/]" if self.can_render else "[red]Tyndall cannot draw here.[/]"
@@ -152,7 +165,12 @@ def diagnose(adapter: str | None = None) -> Report:
             missing.append("no adapter has timestamp queries: passes cannot be timed")
     python = f"{platform.python_version()} ({sys.executable})"
     system = f"{platform.system()} {platform.release()} {platform.machine()}"
-    return Report(adapters, _mitsuba(), python, system, packages, tuple(missing))
+    extras = {name: _version(name) for name in EXTRAS}
+    return Report(adapters, _mitsuba(), python, system, packages, extras, tuple(missing))
+
+
+def _get(package: str) -> str:
+    return f"missing (pip install 'tyndall[{EXTRAS[package]}]')"
 
 
 def _mitsuba() -> str:
