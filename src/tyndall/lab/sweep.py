@@ -137,6 +137,7 @@ def sweep(
     wanted = None if scheduler is not None else _device(adapter)
     with Store(out) as store:
         write_atomically(store.folder / "spec.json", lambda path: _write_json(path, plan.spec))
+        write_atomically(store.folder / "points.json", lambda path: _write_json(path, [p.id for p in plan.points]))
         final = set() if fresh else {p.id for p in plan.points if _final(store.rows.get(p.id))}
         known = {id for id in final if wanted is None or store.rows[id].get("adapter") in (wanted, None)}
         notes = _beginning(plan, store, len(known), fresh)

@@ -70,6 +70,7 @@ def test_what_is_done_is_not_repeated_and_what_is_new_is_added(tmp_path: Path, l
     assert second.notes[1].startswith("1 rows in results.jsonl are not of this specification")
     assert len((tmp_path / "out/results.jsonl").read_text().splitlines()) == 4
     assert json.loads((tmp_path / "out/spec.json").read_text()) == spec([5, 3, 2])
+    assert json.loads((tmp_path / "out/points.json").read_text()) == [row["id"] for row in second.rows]
     again = sweep(spec([3]), tmp_path / "out", workers=0, fresh=True, work=sweep_work.quick)
     assert (measured(log)[3], again.reused) == (2, 0)
 

@@ -50,7 +50,7 @@ def _is_sweep(folder: Path) -> bool:
 
 def _of_sweep(folder: Path) -> str:
     name = folder.resolve().name
-    article = sweep.sweep(sweep.read_rows(folder), name)
+    article = sweep.sweep(*sweep.read_rows(folder), name)
     return page(f"{name} – Tyndall", [(name, article)], {"s-plot0": "Plots", "s-table": "Points"})
 
 

@@ -1,13 +1,15 @@
 """The page of a sweep: what was measured against what varied, and a table of all points.
 
-It is made from ``results.jsonl`` alone (:mod:`tyndall.lab.sweep_store`): an object a line, of which the later one
-counts where two have the same ``id``; a line that is none is passed over, since a run may still be writing.
+It is made from ``results.jsonl`` (:mod:`tyndall.lab.sweep_store`): an object a line, of which the later one counts
+where two have the same ``id``; a line that is none is passed over, since a run may still be writing. ``points.json``
+has the ids of the folder's present specification, in order; rows of an earlier one are left out.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,6 +20,7 @@ from tyndall.lab.report.markup import Html, data, tag
 from tyndall.lab.report.table import scroll
 
 FILE = "results.jsonl"
+POINTS = "points.json"
 MOST_ROWS = 4000  # that a page shows
 
 _MEASURING = frozenset({"truth", "frames", "warmup", "seconds", "seed", "metrics"})
@@ -63,28 +66,60 @@ class Measure:
     hidden: list[int]
 
 
-def read_rows(folder: Path) -> list[Row]:
-    """The rows of a sweep's folder, each point once.
+def read_rows(folder: Path) -> tuple[list[Row], int]:
+    """The rows of a sweep's folder, each point once, and how many others are left out.
 
     Raises:
-        OutputError: the file cannot be read, or holds no row.
+        OutputError: a file cannot be read, holds no row of the sweep, or a row whose figures are no numbers.
     """
     path = folder / FILE
-    try:
-        lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
-    except OSError as error:
-        raise OutputError(f"{path}: {error.strerror or error}") from error
     rows: dict[str, Row] = {}
-    for line in lines:
+    for line in _read(path).split("\n"):  # other ends of lines stand in texts
         try:
             row = json.loads(line)
         except (ValueError, RecursionError):
             continue
         if isinstance(row, dict) and isinstance(row.get("point"), dict) and "id" in row:
             rows[str(row["id"])] = row
-    if not rows:
-        raise OutputError(f"{path}: holds no rows of a sweep")
-    return list(rows.values())
+    kept = rows
+    if (folder / POINTS).exists():
+        try:
+            asked = [str(id) for id in json.loads(_read(folder / POINTS))]
+        except (ValueError, TypeError, RecursionError) as error:
+            raise OutputError(f"{folder / POINTS}: is not a list of points") from error
+        kept = {id: rows[id] for id in asked if id in rows}
+    if not kept:
+        raise OutputError(f"{path}: holds no rows of {'a' if kept is rows else 'this'} sweep")
+    for id, row in kept.items():
+        for name, value in _figures(row):
+            if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+                raise OutputError(f"{path}: point {id}: {name}: {value!r} is not a number")
+    return list(kept.values()), len(rows) - len(kept)
+
+
+def _read(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8", errors="replace")
+    except OSError as error:
+        raise OutputError(f"{path}: {error.strerror or error}") from error
+
+
+def _figures(row: Row) -> Iterator[tuple[str, Any]]:
+    """What the page shows of a row as numbers, where it is there."""
+    errors = row.get("errors") or {}
+    groups: dict[str, Any] = {key: row.get(key) for key in _TIMES}
+    if isinstance(errors, dict):
+        groups |= {f"errors.{kind}": scores for kind, scores in errors.items()}
+    else:
+        groups["errors"] = errors
+    keys = ("median", "rel_rmse_limit", *(metric.key for metric in verdict.METRICS))
+    for name, group in groups.items():
+        if isinstance(group, dict):
+            yield from ((f"{name}.{key}", group[key]) for key in keys if group.get(key) is not None)
+        elif group is not None:
+            yield name, group
+    if row.get("memory_bytes") is not None:
+        yield "memory_bytes", row["memory_bytes"]
 
 
 def dimensions(rows: Sequence[Row]) -> list[Dimension]:
@@ -122,8 +157,8 @@ def measures(rows: Sequence[Row]) -> list[Measure]:
     return [measure for measure in found if any(v is not None for v in measure.values)]
 
 
-def sweep(rows: Sequence[Row], name: str) -> Html:
-    """The sweep as an article."""
+def sweep(rows: Sequence[Row], aside: int, name: str) -> Html:
+    """The sweep as an article; ``aside`` rows of its file are not of its specification."""
     shown = [row for row in rows if row.get("status") == "done"][:MOST_ROWS]
     failed = [row for row in rows if row.get("status") != "done"]
     varied = dimensions(shown or rows)
@@ -133,6 +168,8 @@ def sweep(rows: Sequence[Row], name: str) -> Html:
     notes = []
     if failed:
         notes.append(f"{len(failed)} of them could not be measured; the table says why.")
+    if aside:
+        notes.append(f"{aside} rows of {FILE} are not of this specification, and are left out.")
     if len(shown) < len(rows) - len(failed):
         notes.append(f"This page shows the first {len(shown)}; {FILE} holds them all.")
     adapters = list(dict.fromkeys(str(row["adapter"]) for row in shown if row.get("adapter")))

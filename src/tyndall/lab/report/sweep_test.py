@@ -60,7 +60,42 @@ def folder(tmp_path: Path) -> Path:
 
 
 def test_the_later_row_of_a_point_counts_and_broken_lines_do_not(folder: Path) -> None:
-    assert read_rows(folder) == ROWS
+    assert read_rows(folder) == (ROWS, 0)
+
+
+def test_rows_that_are_not_of_the_present_points_are_left_out(folder: Path) -> None:
+    (folder / "points.json").write_text('["d", "z", "b"]')
+    assert read_rows(folder) == ([ROWS[3], ROWS[1]], 3)
+    text = write_report(folder).read_text(encoding="utf-8")
+    assert "3 rows of results.jsonl are not of this specification" in text
+    (folder / "points.json").write_text('["z"]')
+    with pytest.raises(OutputError, match=r"results\.jsonl: holds no rows of this sweep"):
+        write_report(folder)
+    (folder / "points.json").write_text("7")
+    with pytest.raises(OutputError, match=r"points\.json: is not a list of points"):
+        write_report(folder)
+
+
+def test_a_line_ends_where_the_line_ends(folder: Path) -> None:
+    odd = row("a", {"technique": "off"}, scene_name="a\u2028b\x85c")
+    (folder / "results.jsonl").write_text(json.dumps(odd, ensure_ascii=False) + "\n", encoding="utf-8", newline="\n")
+    assert read_rows(folder) == ([odd], 0)
+
+
+@pytest.mark.parametrize(
+    ("more", "line"),
+    [
+        ({"gpu_ms": {"median": float("nan")}}, "point x: gpu_ms.median: nan is not a number"),
+        ({"memory_bytes": float("inf")}, "point x: memory_bytes: inf is not a number"),
+        ({"errors": {"radiance": "good"}}, "point x: errors.radiance: 'good' is not a number"),
+        ({"errors": {"radiance": {"flip": "good"}}}, "point x: errors.radiance.flip: 'good' is not a number"),
+    ],
+)
+def test_a_figure_that_is_no_number_is_one_line(tmp_path: Path, more: dict[str, Any], line: str) -> None:
+    odd = {**row("x", {"technique": "off"}), **more}
+    (tmp_path / "results.jsonl").write_text(json.dumps(odd) + "\n")
+    with pytest.raises(OutputError, match=re.escape(line)):
+        write_report(tmp_path)
 
 
 def test_what_varies_is_found_in_its_order() -> None:
