@@ -418,6 +418,7 @@ def test_our_truth_is_mitsubas(name: str, judged: Any, gpu: Gpu) -> None:
             getattr(ours, kind),
             getattr(theirs, f"{kind}_error"),
             getattr(ours, f"{kind}_error"),
+            b_freedom=ours.freedom,
             tolerance=5e-4,
         )
         assert result, f"{kind}: {result}"
@@ -436,7 +437,8 @@ def test_the_best_variant_agrees_with_the_scalar_one() -> None:
     found = judge(scene, (32, 24), few(256))
     assert found.judge == f"mitsuba ({best.variant.name})"
     ours = trace(scene, (32, 24), TruthSettings(target=2e-3, samples=1024), cache=False)
-    result = z_test(found.radiance, ours.radiance, found.radiance_error, ours.radiance_error, tolerance=5e-4)
+    errors = (found.radiance_error, ours.radiance_error)
+    result = z_test(found.radiance, ours.radiance, *errors, b_freedom=ours.freedom, tolerance=5e-4)
     assert result, str(result)
 
 

@@ -129,6 +129,8 @@ class Truth:
         seconds: that it took to trace, when it was traced.
         size: width and height in pixels.
         settings: how it was made, as plain data.
+        batches: independent ones that the errors are estimated from: they have one degree of freedom less; None where
+            that is so many that it does not matter.
     """
 
     judge: str
@@ -142,6 +144,12 @@ class Truth:
     seconds: float
     size: tuple[int, int]
     settings: Mapping[str, Any]
+    batches: int | None = None
+
+    @property
+    def freedom(self) -> int | None:
+        """Degrees of freedom of the errors, for :func:`tyndall.lab.ztest.z_test`; None where there are many."""
+        return None if self.batches is None else self.batches - 1
 
     def relative_error(self, kind: Kind = "radiance") -> float:
         """The relative standard error ``sqrt(mean(error²)) / mean(light)`` over all pixels and channels; 0 without
@@ -354,6 +362,8 @@ def _pooled(a: Truth, b: Truth) -> Truth:
         inscattered_error=np.hypot(p * a.inscattered_error, q * b.inscattered_error),
         samples=samples,
         seconds=a.seconds + b.seconds,
+        # A bound: the degrees of freedom of a sum are at least those of either.
+        batches=None if a.batches is None or b.batches is None else min(a.batches, b.batches),
     )
 
 
@@ -558,6 +568,7 @@ class _Tracer(Closing):
             seconds=0.0,
             size=self.size,
             settings={},
+            batches=self._batches,
         )
 
     def close(self) -> None:
@@ -609,7 +620,13 @@ def _load(entry: Path, size: tuple[int, int]) -> Truth | None:
         if [a.shape for a in arrays.values()] != shapes or any(a.dtype != np.float32 for a in arrays.values()):
             return None
         return Truth(
-            "traced", **arrays, samples=int(about["samples"]), seconds=float(about["seconds"]), size=size, settings={}
+            "traced",
+            **arrays,
+            samples=int(about["samples"]),
+            seconds=float(about["seconds"]),
+            size=size,
+            settings={},
+            batches=int(about["batches"]),
         )
     except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile, zlib.error):
         return None
@@ -617,7 +634,7 @@ def _load(entry: Path, size: tuple[int, int]) -> Truth | None:
 
 def _save(entry: Path, truth: Truth) -> None:
     entry.parent.mkdir(parents=True, exist_ok=True)
-    about = json.dumps({"samples": truth.samples, "seconds": truth.seconds})
+    about = json.dumps({"samples": truth.samples, "seconds": truth.seconds, "batches": truth.batches})
     with atomic_write(entry) as file:
         np.savez(file, about=np.array(about), **{name: getattr(truth, name) for name in _ARRAYS})
     for other in entry.parent.parent.iterdir():
