@@ -43,9 +43,10 @@ forgotten: what depends on it is only where samples go, not what they say, so th
 of dim and of bright light alike are within the range of its 32-bit numbers.
 
 **The error that stops** is :meth:`Truth.relative_error`, of radiance and of in-scattered light alike, summed on the
-device. **The cache** keeps truths by content (scene, size, depth, filter, seed, and the code that took part), under
-``$TYNDALL_CACHE/truth``: a truth with a smaller error serves a request for a larger one, and is where a request for a
-smaller one goes on from.
+device. **The cache** keeps truths by content (scene, size, depth, filter, seed, the code that took part, the versions
+of wgpu and wesl-py, and whether a processor or a GPU draws), under ``$TYNDALL_CACHE/truth``, of the last few versions
+of the code: a truth with a smaller error serves a request for a larger one, is where a request for a smaller one goes
+on from, and is never replaced by a worse one.
 """
 
 from __future__ import annotations
@@ -61,6 +62,7 @@ import zipfile
 import zlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from importlib import metadata
 from pathlib import Path
 from typing import Any, Literal
 
@@ -89,6 +91,7 @@ _PILOT_NUMBERS = 1 << 30  # sequences of their own
 _WORTH_A_PILOT = 1024  # samples
 _SUBMIT_S = 0.25  # work sent at once: short enough for any driver's watchdog, long enough to fill a device
 _LOOP_LIMIT = 50_000  # iterations that a software adapter runs before it silently cuts an invocation's loops: 2^16
+_VERSIONS = 4  # of the code, whose truths the cache keeps
 _RAY_STEPS = 200  # iterations of a ray, generously
 
 Floats = NDArray[np.float32]
@@ -192,14 +195,14 @@ def trace(
     if min(size) < 1:
         raise GpuError(f"size: {size[0]}×{size[1]} is not a picture")
     size = int(size[0]), int(size[1])
-    entry = _entry(scene, size, settings) if cache else None
-    before = _load(entry, size) if entry else None
-    if before is not None and _met(before, settings):
-        if progress:
-            progress(1.0)
-        return _described(before, settings)
     device = gpu or Gpu(adapter)
     try:
+        entry = _entry(scene, size, settings, device) if cache else None
+        before = _load(entry, size) if entry else None
+        if before is not None and _met(before, settings):
+            if progress:
+                progress(1.0)
+            return _described(before, settings)
         with _Tracer(device, scene, size, settings) as tracer:
             found = _converge(tracer, settings, before, progress)
     finally:
@@ -592,7 +595,7 @@ def _is_soft(light: Any) -> bool:
 _ARRAYS = ("radiance", "inscattered", "surfaces", "depth", "radiance_error", "inscattered_error")
 
 
-def _entry(scene: Scene, size: tuple[int, int], settings: TruthSettings) -> Path:
+def _entry(scene: Scene, size: tuple[int, int], settings: TruthSettings, gpu: Gpu) -> Path:
     """The file of a truth: under the version of the code that takes part, by what it is a truth of."""
     package = Path(tyndall.__file__).parent
     sources = [
@@ -605,7 +608,9 @@ def _entry(scene: Scene, size: tuple[int, int], settings: TruthSettings) -> Path
     sources += sorted(
         p for p in (package / "tracing").iterdir() if p.suffix in (".py", ".wesl") and "_test" not in p.name
     )
-    content = f"{scene_hash(scene)} {size[0]} {size[1]} {settings.depth} {settings.filter} {settings.seed}"
+    # Compilers differ in rounding, and may have errors of their own: one truth is no other's.
+    drawn = f"{gpu.adapter_info['adapter_type'] == 'CPU'} {metadata.version('wgpu')} {metadata.version('wesl-py')}"
+    content = f"{scene_hash(scene)} {size[0]} {size[1]} {settings.depth} {settings.filter} {settings.seed} {drawn}"
     key = hashlib.sha256(content.encode()).hexdigest()[:32]
     return directory() / "truth" / version_of(sources) / f"{key}.npz"
 
@@ -633,10 +638,22 @@ def _load(entry: Path, size: tuple[int, int]) -> Truth | None:
 
 
 def _save(entry: Path, truth: Truth) -> None:
+    """Keep a truth, unless another process has left a better one meanwhile; and of other versions the newest."""
     entry.parent.mkdir(parents=True, exist_ok=True)
+    there = _load(entry, truth.size)
+    if there is not None and _Level.of(there).error <= _Level.of(truth).error:
+        return
     about = json.dumps({"samples": truth.samples, "seconds": truth.seconds, "batches": truth.batches})
     with atomic_write(entry) as file:
         np.savez(file, about=np.array(about), **{name: getattr(truth, name) for name in _ARRAYS})
-    for other in entry.parent.parent.iterdir():
-        if other != entry.parent:
-            shutil.rmtree(other, ignore_errors=True)
+    others = [other for other in entry.parent.parent.iterdir() if other != entry.parent]
+    for other in sorted(others, key=_age)[_VERSIONS - 1 :]:
+        shutil.rmtree(other, ignore_errors=True)
+
+
+def _age(folder: Path) -> float:
+    """Smaller is younger; a folder that another process has removed meanwhile is the oldest."""
+    try:
+        return -folder.stat().st_mtime
+    except OSError:
+        return math.inf

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import os
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,8 @@ import pytest
 
 from tyndall.gpu.device import Gpu, GpuError
 from tyndall.gpu.params import ParameterError
-from tyndall.lab.truth import Truth, TruthSettings, trace
+from tyndall.lab import truth as module
+from tyndall.lab.truth import BATCHES, Truth, TruthSettings, trace
 from tyndall.scene.model import (
     Camera,
     DirectionalLight,
@@ -440,6 +442,9 @@ def test_an_earlier_truth_serves_and_is_gone_on_from(gpu: Gpu, cache: Path) -> N
         for name in ("radiance", "inscattered", "surfaces", "depth", "radiance_error", "inscattered_error"):
             assert np.array_equal(getattr(served, name), getattr(first, name)), name
         assert (served.samples, served.seconds, served.judge) == (first.samples, first.seconds, first.judge)
+        assert served.batches == first.batches
+    assert first.freedom is not None
+    assert first.freedom >= BATCHES - 1
     assert looser.settings["target"] == 0.04
 
     finer = trace(scene, SIZE, TruthSettings(target=0.003), gpu=gpu)
@@ -486,6 +491,42 @@ def test_a_damaged_entry_is_traced_again(gpu: Gpu, cache: Path, damage: bytes | 
     assert files(cache) == [entry]
     with np.load(entry) as file:
         assert np.array_equal(file["radiance"], first.radiance)
+
+
+def test_a_worse_truth_replaces_no_better_one(gpu: Gpu, cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two processes begin at once, and the hasty one ends last."""
+    scene = Scene([*props.slits(-3, 2.0, 0.3, 4), props.wall(-6)], [SUN], props.AHEAD, FOG)
+    better = trace(scene, SIZE, QUICK, gpu=gpu)
+    (entry,) = files(cache)
+    whole = entry.read_bytes()
+    load, calls = module._load, []
+
+    def late(entry: Path, size: tuple[int, int]) -> Truth | None:
+        calls.append(entry)
+        return None if len(calls) == 1 else load(entry, size)
+
+    monkeypatch.setattr(module, "_load", late)
+    worse = trace(scene, SIZE, TruthSettings(target=1, samples=64), gpu=gpu)
+    assert worse.relative_error("inscattered") > better.relative_error("inscattered")
+    assert entry.read_bytes() == whole
+
+
+def test_truths_of_the_last_versions_of_the_code_stay(gpu: Gpu, cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = Scene([props.wall(-6)], [SUN], props.AHEAD, FOG)
+    for version in range(6):
+        monkeypatch.setattr(module, "version_of", lambda _, version=version: f"version{version}")
+        trace(scene, SIZE, TruthSettings(target=1, samples=32), gpu=gpu)
+        os.utime(cache / f"version{version}", (version, version))
+    assert sorted(p.name for p in cache.iterdir()) == ["version2", "version3", "version4", "version5"]
+
+
+def test_a_processors_truth_is_no_gpus(gpu: Gpu, cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = Scene([props.wall(-6)], [SUN], props.AHEAD, FOG)
+    entry = module._entry(scene, SIZE, QUICK, gpu)
+    assert module._entry(scene, SIZE, dataclasses.replace(QUICK, target=0.5), gpu) == entry
+    other = "DiscreteGPU" if gpu.adapter_info["adapter_type"] == "CPU" else "CPU"
+    monkeypatch.setitem(gpu.adapter_info, "adapter_type", other)
+    assert module._entry(scene, SIZE, QUICK, gpu) != entry
 
 
 def test_a_cache_that_cannot_be_written_is_no_error(gpu: Gpu, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
