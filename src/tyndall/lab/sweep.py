@@ -2,7 +2,7 @@
 
 What is measured is a specification (:mod:`tyndall.lab.sweep_spec`); it is refused whole where anything in it is wrong.
 Its points are measured one by one, by one process or by several, each on its own device
-(:mod:`tyndall.lab.sweep_workers`), and each row is on the disk before the next point counts as begun
+(:mod:`tyndall.lab.sweep_workers`), and each row is on the disk before its worker begins the next point
 (:mod:`tyndall.lab.sweep_store`). So a sweep can be stopped at any moment, and goes on where it was: a point that is
 done is never repeated, and one that an earlier specification of the same folder shares with this one counts as done.
 
@@ -256,17 +256,23 @@ class _Run:
             worker.end()
 
     def shared(self, workers: Sequence[tuple[Worker, int]], adapter: str | None) -> None:
-        """Measure by several workers, given with their ranks; rows are written by this thread alone."""
-        events: queue.SimpleQueue[tuple[Point, dict[str, Any] | None] | BaseException | None] = queue.SimpleQueue()
+        """Measure by several workers, given with their ranks. A worker's row is written before it has its next point;
+        progress is told by this thread alone."""
+        events: queue.SimpleQueue[tuple[Point, bool] | BaseException | None] = queue.SimpleQueue()
+        writing = threading.Lock()
 
         def serve(number: int, worker: Worker, rank: int) -> None:
             try:
                 while not self._stop.is_set() and (point := self._take(number)) is not None:
-                    events.put((point, None))
+                    events.put((point, False))
                     answer = self._asked(worker, _task(point, adapter, rank))
-                    if not self._stop.is_set():
-                        events.put((point, answer))
+                    with writing:
+                        if self._stop.is_set():
+                            break
+                        self._write(point, answer)
+                    events.put((point, True))
             except BaseException as error:
+                self._stop.set()
                 events.put(error)
             finally:
                 events.put(None)
@@ -285,10 +291,10 @@ class _Run:
                     running -= 1
                 elif isinstance(event, BaseException):
                     raise event
-                elif event[1] is None:
-                    self._tell(str(event[0]))
                 else:
-                    self._add(*event)  # type: ignore[arg-type]
+                    point, measured = event
+                    self._done += measured
+                    self._tell("" if measured else str(point))
         finally:
             self._stop.set()
             for worker, _ in workers:
@@ -326,12 +332,15 @@ class _Run:
             return None
 
     def _add(self, point: Point, answer: Mapping[str, Any]) -> None:
+        self._write(point, answer)
+        self._done += 1
+        self._tell("")
+
+    def _write(self, point: Point, answer: Mapping[str, Any]) -> None:
         status = {name: answer[name] for name in ("status", "reason")}
         figures = {name: value for name, value in answer.items() if name not in status}
         row = {"id": point.id, **status, "point": point.description, "scene_hash": point.scene_hash, **figures}
         self._store.add(row)
-        self._done += 1
-        self._tell("")
 
     def _tell(self, text: str) -> None:
         if self._progress:

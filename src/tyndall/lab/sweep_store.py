@@ -1,7 +1,7 @@
 """The folder of a sweep: rows as they are measured, and the table that they end in.
 
-``results.jsonl`` holds a JSON object a line, a line a point. A row is appended whole and forced to the disk before the
-next point counts as begun, so that a run that is killed loses what was being measured and nothing else. A line that was
+``results.jsonl`` holds a JSON object a line, a line a point. A row is appended whole and forced to the disk before
+its worker begins another, so that a run that is killed loses what was being measured and nothing else. A line that was
 cut off by that is removed when the folder is opened again. Of two rows of one point the later one counts. While a run
 has the folder, the file is locked, and a second run is refused.
 """
