@@ -159,7 +159,8 @@ def compare(
     *,
     size: Size = "1280x720",
     family: Annotated[
-        Literal["volumetric", "shadow"], typer.Option(help="Whose techniques are compared.")
+        Literal["volumetric", "shadow"],
+        typer.Option(help="Whose techniques are compared; shadows without the air, unless --volumetric asks for it."),
     ] = "volumetric",
     technique: Annotated[
         list[str] | None,

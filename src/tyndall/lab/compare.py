@@ -40,7 +40,7 @@ from tyndall.lab.picture import Picture, check_folder
 from tyndall.lab.stage import Overrides, Stage, Still, describe, make
 from tyndall.lab.standard import KINDS, Standard
 from tyndall.lab.truth import Truth, TruthSettings
-from tyndall.scene.model import DirectionalLight, Scene
+from tyndall.scene.model import DirectionalLight, Medium, Scene
 from tyndall.techniques import FAMILIES
 from tyndall.techniques.contract import Technique, Unsupported
 
@@ -82,7 +82,9 @@ def compare(
         size: width and height in pixels.
         family: "volumetric" or "shadow": whose techniques are compared.
         volumetric, shadow: of the compared family one or more techniques, by name or ready made, None for all of them,
-            less those that refuse the scene; of the other family one, or None for its default.
+            less those that refuse the scene; of the other family one, or None for its default. Shadows are compared
+            without the air unless a volumetric technique is asked for: what it asks a shadow technique about points in
+            the air would be its time, and not the shadow technique's.
         occlusion, antialiasing, tonemap: by name or ready made; None is the family's default.
         model: "physical", "paper" or "both", for volumetric techniques that have models; None leaves each as it is.
         parameters: by technique name, parameters to change: ``{"froxel": {"grid": (190, 90, 128)}}``.
@@ -115,8 +117,11 @@ def compare(
     compared, other = (volumetric, shadow) if family == "volumetric" else (shadow, volumetric)
     fixed = "shadow" if family == "volumetric" else "volumetric"
     techniques = choose(scene, compared, model, parameters, family)
+    beside = single(other, fixed, family)
+    if family == "shadow" and beside in (None, "off"):
+        scene, beside = scene.with_(medium=Medium()), "off"
     others = {
-        fixed: single(other, fixed, family),
+        fixed: beside,
         "occlusion": occlusion,
         "antialiasing": antialiasing,
         "tonemap": tonemap,

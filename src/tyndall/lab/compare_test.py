@@ -383,6 +383,27 @@ def test_shadows_are_judged_by_the_light_of_surfaces(gpu: Gpu, scene: Scene) -> 
     assert found["shadow_map-2"].memory_bytes >= 4 * 1024**2
 
 
+@pytest.mark.usefixtures("own_cache")
+@pytest.mark.parametrize("volumetric", [None, "off"])
+def test_shadows_are_compared_without_the_air(gpu: Gpu, scene: Scene, volumetric: str | None) -> None:
+    """So that neither its light nor its rays are a shadow technique's, and frame and truth agree on what dims."""
+    found = compare(
+        scene,
+        size=SIZE,
+        family="shadow",
+        shadow=["ray_traced"],
+        volumetric=volumetric,
+        truth_settings=TruthSettings(samples=32, target=1.0),
+        frames=1,
+        warmup=0,
+        adapter=gpu,
+    )
+    (rays,) = found.results
+    assert rays.scores["surfaces"].rel_rmse_corrected < 0.15
+    assert abs(rays.scores["surfaces"].bias) < 0.02
+    assert found.to_json()["parameters"]["volumetric"]["technique"] == "off"
+
+
 def test_the_march_judges_the_technique_and_not_the_map(gpu: Gpu, scene: Scene, noisy: Truth) -> None:
     """Through a map of 64 texels a right technique has no error where the truth has the same map, and else it has."""
     options: dict[str, Any] = {"size": SIZE, "frames": 1, "warmup": 0, "adapter": gpu, "shadow": ShadowMap(size=64)}
