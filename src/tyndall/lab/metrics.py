@@ -178,15 +178,14 @@ def hidden(image: Light, reference: Light, error: Light) -> tuple[float, bool] |
     """
     x, r = _pair(image, reference)
     mean, noise = float(r.mean()), np.square(error, dtype=np.float64)
-    if mean <= 0 or not noise.any():
+    if mean <= 0 or not noise.any() or not np.isfinite(noise).all():
         return None
     squares = np.mean((x - r) ** 2 - noise, axis=-1)
     left = float(squares.mean())
     scatter = float(squares.std()) / math.sqrt(squares.size)
     normal = np.mean(4 * np.maximum((x - r) ** 2 - noise, 0) * noise + 2 * noise**2, axis=-1)
     uncertain = 3 * min(scatter, math.sqrt(float(normal.sum())) / squares.size)
-    limit = math.sqrt(max(0.0, left) + uncertain) / mean if math.isfinite(left + uncertain) else math.nan
-    return (limit, left < uncertain) if math.isfinite(limit) else None
+    return math.sqrt(max(0.0, left) + uncertain) / mean, left < uncertain
 
 
 def relative_noise(reference: Light, error: Light | None) -> float | None:
