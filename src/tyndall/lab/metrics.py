@@ -404,11 +404,11 @@ def _extreme(values: NDArray[np.float64], reach: int, which: Any) -> NDArray[np.
 
 
 def _without_noise(difference: NDArray[np.float64], error: Light | None) -> float:
-    """Root of the mean square, less the expected square of the reference's noise; not finite where that is not."""
+    """Root of the mean square, less the expected square of the reference's noise; NaN where that is not finite."""
     square = float(np.mean(difference**2))
     if error is not None:
         square -= float(np.mean(np.square(error, dtype=np.float64)))
-    return math.sqrt(max(square, 0.0))  # max keeps its first argument where that is no number
+    return math.sqrt(max(0.0, square)) if math.isfinite(square) else math.nan
 
 
 def _finite(value: float) -> float | None:
