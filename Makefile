@@ -6,7 +6,7 @@ READY := .venv/.ready
 .PHONY: demo test lint types unit format lock clean
 
 demo: $(READY)
-	.venv/bin/tyndall compare box --size 320x180 --out out/demo --report
+	.venv/bin/tyndall compare box --size 240x135 --truth.seconds 40 --out out/demo --report
 
 test: lint types unit
 

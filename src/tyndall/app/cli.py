@@ -369,6 +369,14 @@ def _explain(error: Exception) -> tuple[str, int]:
     return f"this is a fault in Tyndall: {kind.__name__}: {error} (--debug shows where)", FAULT
 
 
+def _flag_of(technique: str) -> str:
+    """The flag that chooses a technique."""
+    from tyndall.techniques import FAMILIES
+
+    family = next(name for name, family in FAMILIES.items() if technique in family.members)
+    return "--technique" if family == "volumetric" else f"--{family}"
+
+
 def _others(**chosen: str | None) -> dict[str, str]:
     """The technique of each family, for the families where one was chosen."""
     return {family: name.replace("-", "_") for family, name in chosen.items() if name is not None}
@@ -409,7 +417,7 @@ def _parameters(
     for name, values in parameters.items():
         if name not in {used for _, used in chosen}:
             raise ParameterError(
-                f"--{name}.{next(iter(values))}: '{name}' is not drawn here; choose it with its family"
+                f"--{name}.{next(iter(values))}: '{name}' is not drawn here; choose it with {_flag_of(name)} {name}"
             )
     if model is not None:
         switched = [name for name in compared if any(f.name == "model" for f in fields_of(members[name]))]

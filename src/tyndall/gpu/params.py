@@ -186,7 +186,7 @@ def _as_type(tp: Any, value: Any) -> Any:
         return value
     if origin is tuple:
         args = get_args(tp)
-        items = value.split(",") if isinstance(value, str) else list(value)
+        items = value.split("," if "," in value else "x") if isinstance(value, str) else list(value)
         if len(items) != len(args):
             raise ValueError(value)
         return tuple(_as_type(a, item) for a, item in zip(args, items, strict=True))

@@ -79,6 +79,11 @@ def test_a_shader_reads_every_field(gpu: Gpu) -> None:
     out.destroy()
 
 
+@pytest.mark.parametrize("text", ["7,8,9", "7x8x9", " 7, 8 ,9"])
+def test_several_numbers_in_a_text(text: str) -> None:
+    assert params.replace(Everything(), {"grid": text}).grid == (7, 8, 9)
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
