@@ -88,8 +88,8 @@ def test_everything_is_measured_and_written(gpu: Gpu, tmp_path: Path) -> None:
     assert errors["off", 128] > errors["polygonal", 128]
 
     files = {path.name for path in (tmp_path / "out").iterdir()}
-    assert len(files) <= 8
-    assert files >= {"results.jsonl", "spec.json", "volumetric-time.svg", "volumetric-lights.svg"}
+    assert len(files) <= 9
+    assert files >= {"results.jsonl", "spec.json", "points.json", "volumetric-time.svg", "volumetric-lights.svg"}
 
     begun = len((tmp_path / "out/results.jsonl").read_bytes().splitlines())
     again = bench.volumetric(gpu, tmp_path / "out", settings=TINY)
