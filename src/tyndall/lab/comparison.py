@@ -218,9 +218,10 @@ class Comparison:
         if self.reference:
             notes.append(self.reference.caption())
         if any(r.main and r.main.within_noise for r in self.results):
-            notes.append("<: less than this is hidden in the truth's noise")
+            notes.append("<: less than this is hidden in the truth's noise; more --truth.seconds leave less of it,")
+            notes.append("   and --truth march, a march in the same shadow map, has none")
         if self.reference and self.reference.noise["radiance"] > _NOISY:
-            notes.append("FLIP and PSNR count the truth's noise as well")
+            notes.append("FLIP, PSNR and errors at edges count the truth's noise as well")
         if any(not result.measurement.passes for result in self.results):
             notes.append("this adapter cannot time what it draws (timestamp-query)")
         if any(result.model == "paper" for result in self.results):
