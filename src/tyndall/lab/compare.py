@@ -40,7 +40,7 @@ from tyndall.lab.picture import Picture, check_folder
 from tyndall.lab.stage import Overrides, Stage, Still, describe, make
 from tyndall.lab.standard import KINDS, Standard
 from tyndall.lab.truth import Truth, TruthSettings
-from tyndall.scene.model import DirectionalLight, Medium, Scene
+from tyndall.scene.model import Medium, Scene
 from tyndall.techniques import FAMILIES
 from tyndall.techniques.contract import Technique, Unsupported
 
@@ -297,6 +297,4 @@ def _result(drawn: _Drawn, family: str, known: Standard | None, judged: dict[str
 
 def is_soft(scene: Scene) -> bool:
     """Whether a light has a size, so that its shadows are sampled."""
-    return any(
-        (light.angular_diameter if isinstance(light, DirectionalLight) else light.radius) > 0 for light in scene.lights
-    )
+    return any(light.extent > 0 for light in scene.lights)

@@ -460,18 +460,15 @@ def _light(light: Light) -> dict[str, Any]:
     found: dict[str, Any] = {
         "kind": light.kind,
         "intensity": [light.intensity * c for c in light.color],
+        "radius": light.extent,
     }
-    if isinstance(light, DirectionalLight):
-        found["radius"] = math.tan(light.angular_diameter / 2)
-    else:
-        found["position"], found["radius"] = light.position, light.radius
+    if not isinstance(light, DirectionalLight):
+        found["position"] = light.position
     if isinstance(light, (DirectionalLight, SpotLight)):
         direction = np.asarray(light.direction, np.float64)
         found["direction"] = (direction / np.linalg.norm(direction)).tolist()
     if isinstance(light, SpotLight):
-        # KHR_lights_punctual: saturate(cos·scale + offset)², as the frame packs it.
-        scale = 1 / max(1e-7, math.cos(light.inner_angle) - math.cos(light.outer_angle))
-        found["cone_scale"], found["cone_offset"] = scale, -math.cos(light.outer_angle) * scale
+        found["cone_scale"], found["cone_offset"] = light.cone
     return found
 
 

@@ -77,7 +77,7 @@ from tyndall.gpu.resources import Buffer, Closing
 from tyndall.lab.fingerprint import scene_hash
 from tyndall.scene.bundled.cache import directory, version_of
 from tyndall.scene.files.atomic import atomic_write
-from tyndall.scene.model import DirectionalLight, Scene
+from tyndall.scene.model import Scene
 from tyndall.tracing.world import World
 
 OWNER = "truth"
@@ -416,7 +416,7 @@ class _Tracer(Closing):
             self._job["depth"] = settings.depth
             self._job["over_pixel"] = settings.filter == "box"
             self._job["emission"] = 1 / self._unit
-            self._job["soft"] = any(_is_soft(light) for light in scene.lights)
+            self._job["soft"] = any(light.extent > 0 for light in scene.lights)
             self._job_buffer = self._struct("job", self._job, f"{_MODULE}::Job")
             self._scope["job"] = self._job_buffer.uniform()
         except BaseException:
@@ -584,10 +584,6 @@ class _Tracer(Closing):
             self._world.close()
             self._world = None
         self._gpu.forget_groups()
-
-
-def _is_soft(light: Any) -> bool:
-    return bool(light.angular_diameter if isinstance(light, DirectionalLight) else light.radius)
 
 
 # --- cache --------------------------------------------------------------------------------------------------------

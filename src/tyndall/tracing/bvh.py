@@ -30,7 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tyndall.gpu.device import Gpu, GpuError, Prepared
-from tyndall.gpu.resources import Buffer, Closing, Parts, Resource
+from tyndall.gpu.resources import Buffer, Closing, Parts
 
 OWNER = "tracing"
 RADIUS = 16  # neighbours searched on either side; 8 builds faster, 32 hardly traces faster
@@ -182,10 +182,6 @@ class Clustering(Closing):
             .prepare()
             for entry in (mode, "count_merges", "scan_merges", "merge")
         ]
-
-    def resources(self) -> list[Resource]:
-        """What the build holds on the device."""
-        return list(self._buffers)
 
     def close(self) -> None:
         """Free the temporary buffers."""

@@ -28,7 +28,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from tyndall.gpu.params import param
-from tyndall.scene.model import DirectionalLight, Light
 from tyndall.techniques.accumulation import accumulated
 from tyndall.techniques.contract import Technique, View, Visibility
 from tyndall.techniques.shadow.shadow_map import ShadowMap
@@ -61,7 +60,7 @@ class RayTraced(Technique):
             return empty.render(view.part(empty), content)
         lights = view.scene.lights
         world = view.world.bindings
-        soft = [_is_soft(light) for light in lights]
+        soft = [light.extent > 0 for light in lights]
         if any(soft):
             means, images = accumulated(view, len(lights))
             view.compute("soft").bind(world, **images).dispatch(*view.size, len(lights))
@@ -77,7 +76,3 @@ class RayTraced(Technique):
         drawn = maps.render(view.part(maps), content)
         air = drawn.module if self.air == "map" else self.shader()
         return Visibility(air, self.shader(), {**bindings, **drawn.bindings}, drawn.maps)
-
-
-def _is_soft(light: Light) -> bool:
-    return (light.angular_diameter if isinstance(light, DirectionalLight) else light.radius) > 0
