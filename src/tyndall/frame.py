@@ -247,6 +247,7 @@ class Renderer(Closing):
 
         shadow = self._view("shadow")
         shadow.maps_wanted = self.technique("volumetric").reads_maps
+        shadow.air_wanted = self.technique("volumetric").lights_air
         visibility = self.technique("shadow").render(shadow, self._content if casters else [])
         occlusion = self.technique("occlusion").render(self._view("occlusion"))
         scope = {**scope, **visibility.bindings, **occlusion.bindings}

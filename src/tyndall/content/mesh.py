@@ -11,11 +11,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tyndall.content.contract import Casters, Cull
+from tyndall.content.outline import Outline, Placed
 from tyndall.gpu.device import Blend, Gpu, Raster
 from tyndall.gpu.resources import Bound, Buffer, Resource, Texture
 from tyndall.scene.model import Material, Mesh, Scene
@@ -42,15 +44,30 @@ _MASKED_DEPTH = Raster(depth=DEPTH_FORMAT, vertex_buffers=(_POSITION, _ATTRIBUTE
 _SOLID_DEPTH = Raster(depth=DEPTH_FORMAT, vertex_buffers=(_POSITION,))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Draw:
-    material: Material
+    mesh: Mesh
     mirrored: bool
     first_index: int
-    index_count: int
     base_vertex: int
     first_instance: int
-    instance_count: int
+    transforms: tuple[NDArray[np.float64], ...]
+
+    @property
+    def material(self) -> Material:
+        return self.mesh.material
+
+    @property
+    def is_masked(self) -> bool:
+        """Whether its material has holes."""
+        return self.material.alpha_mode == "mask"
+
+    def placements(self) -> list[Placed]:
+        """Each of its instances."""
+        return [
+            Placed(self.mesh, self.first_index, self.base_vertex, self.first_instance + i, self.mirrored, transform)
+            for i, transform in enumerate(self.transforms)
+        ]
 
 
 class Meshes:
@@ -71,6 +88,8 @@ class Meshes:
         self._buffers: list[Buffer] = []
         self._draws: list[_Draw] = []
         self._maps: dict[int, dict[str, Bound]] = {}
+        self._outline: Outline | None = None
+        self._outlined = False
         try:
             self._upload(scene)
         except BaseException:
@@ -125,9 +144,7 @@ class Meshes:
             rows["normal"][first:stop, :, :3] = normal_columns(world[:, :3, :3])
             rows["material"][first:stop] = self.material_of[key]
             first_index, first_vertex = self.placed[key]
-            self._draws.append(
-                _Draw(mesh.material, mirrored, first_index, mesh.indices.size, first_vertex, first, len(matrices))
-            )
+            self._draws.append(_Draw(mesh, mirrored, first_index, first_vertex, first, tuple(matrices)))
             first = stop
         self._instances = self._buffer("instances", rows, element=f"{MODULE}::InstanceData")
         self.materials = self._buffer(
@@ -181,25 +198,42 @@ class Meshes:
         """Draw into the G-buffer; ``scope`` binds ``camera``."""
         self._replay(native_pass, "gbuffer", scope, "back")
 
-    def draw_depth(self, native_pass: Any, scope: Mapping[str, Bound], cull: Literal["none", "front", "back"]) -> None:
+    def draw_depth(self, native_pass: Any, scope: Mapping[str, Bound], cull: Cull, casters: Casters = "all") -> None:
         """Draw depth from a light; ``scope`` binds ``shadow_layers`` and ``layer``.
 
         Args:
             cull: faces to leave out, as the light sees them; double-sided materials are always drawn whole.
+            casters: "beside_outline" leaves out what :meth:`outline` describes.
         """
-        self._replay(native_pass, "depth", scope, cull)
+        self._replay(native_pass, "depth", scope, cull, casters)
 
-    def _replay(self, native_pass: Any, kind: str, scope: Mapping[str, Bound], cull: str) -> None:
-        if not self._draws:
+    def casts_beside_outline(self) -> bool:
+        """Whether something casts a shadow that :meth:`outline` does not describe: surfaces with holes."""
+        return any(draw.is_masked for draw in self._draws)
+
+    def outline(self) -> Outline | None:
+        """The adjacency of all solid triangles, made on first use and then kept; None where there are none."""
+        if not self._outlined:
+            self._outlined = True
+            solid = [p for draw in self._draws if not draw.is_masked for p in draw.placements()]
+            streams = (self.positions, self.indices, self._instances.read())
+            self._outline = Outline(self._gpu, solid, streams, owner=OWNER) if solid else None
+        return self._outline
+
+    def _replay(
+        self, native_pass: Any, kind: str, scope: Mapping[str, Bound], cull: str, casters: Casters = "all"
+    ) -> None:
+        draws = [draw for draw in self._draws if casters == "all" or draw.is_masked]
+        if not draws:
             return
         names = ("camera",) if kind == "gbuffer" else ("shadow_layers", "layer")
         bound = {name: scope[name] for name in names}
-        key = (kind, cull, tuple(b.key for b in bound.values()))
+        key = (kind, cull, casters, tuple(b.key for b in bound.values()))
         if key not in self._bundles:
-            self._bundles[key] = self._record(kind, bound, cull)
+            self._bundles[key] = self._record(kind, bound, cull, draws)
         native_pass.execute_bundles([self._bundles[key]])
 
-    def _record(self, kind: str, scope: Mapping[str, Any], cull: str) -> Any:
+    def _record(self, kind: str, scope: Mapping[str, Any], cull: str, draws: list[_Draw]) -> Any:
         gpu = self._gpu
         base = _GBUFFER if kind == "gbuffer" else _SOLID_DEPTH
         bundle = gpu.bundle(f"mesh.{kind}", base)
@@ -207,8 +241,8 @@ class Meshes:
         bundle.set_vertex_buffer(0, self.positions.native)
         bundle.set_vertex_buffer(1, self.attributes.native)
         current: Any = None
-        for draw in self._draws:
-            masked = draw.material.alpha_mode == "mask"
+        for draw in draws:
+            masked = draw.is_masked
             faces = "none" if draw.material.double_sided else cull
             if draw.mirrored:
                 faces = {"none": "none", "front": "back", "back": "front"}[faces]
@@ -237,13 +271,14 @@ class Meshes:
                 current = pipeline
             bundle.set_bind_group(0, group)
             bundle.draw_indexed(
-                draw.index_count, draw.instance_count, draw.first_index, draw.base_vertex, draw.first_instance
+                draw.mesh.indices.size, len(draw.transforms), draw.first_index, draw.base_vertex, draw.first_instance
             )
         return bundle.finish()
 
     def resources(self) -> list[Resource]:
         """What the meshes hold on the device."""
-        return [*self._buffers, *self._textures.values()]
+        outline = self._outline.resources() if self._outline else []
+        return [*self._buffers, *self._textures.values(), *outline]
 
     def forget_bundles(self) -> None:
         """Drop what was recorded, so that destroyed resources are not kept alive by it."""
@@ -256,6 +291,7 @@ class Meshes:
             resource.destroy()
         self._buffers.clear()
         self._textures.clear()
+        self._outline = None
 
 
 def origin_of(mesh: Mesh) -> NDArray[np.float64]:

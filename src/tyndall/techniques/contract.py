@@ -32,6 +32,7 @@ class Technique:
         paper: who described it, and when.
         advice: one honest line on when to use it.
         reads_maps: whether it reads the shadow maps themselves, beyond asking for visibility.
+        lights_air: whether it asks the shadow technique about points in the air.
         casts_rays: whether it asks :attr:`View.world`; the frame then builds it before it records anything.
     """
 
@@ -39,6 +40,7 @@ class Technique:
     paper: ClassVar[str]
     advice: ClassVar[str]
     reads_maps: ClassVar[bool] = False
+    lights_air: ClassVar[bool] = True
     casts_rays: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
@@ -73,6 +75,7 @@ class View:
         owner: "family.name": owner in the ledger and prefix of its passes.
         maps_wanted: whether the volumetric technique reads shadow maps; what a shadow technique need not draw
             otherwise.
+        air_wanted: whether the volumetric technique asks for visibility in the air.
     """
 
     gpu: Gpu
@@ -85,6 +88,7 @@ class View:
     overlay: dict[str, str] = field(default_factory=dict)
     frame: int = 0
     maps_wanted: bool = False
+    air_wanted: bool = True
     make_world: Callable[[], World] | None = None
     _resources: dict[str, Resource] = field(default_factory=dict)
     _descriptions: dict[str, Any] = field(default_factory=dict)
@@ -143,9 +147,14 @@ class View:
         made = self.gpu.compute(f"{self.owner}.{entry}", self.technique.shader(), entry)
         return made.bind(self.scope, params=self.params).overlay(self.overlay)
 
-    def part(self, technique: Technique) -> View:
-        """The same frame as another technique sees it that this one makes use of; it lives as long as this view."""
-        made = self._parts.get(technique.name)
+    def part(self, technique: Technique, label: str | None = None) -> View:
+        """The same frame as another technique sees it that this one makes use of; it lives as long as this view.
+
+        Args:
+            label: of this use, where the technique's name is not enough to tell it from another.
+        """
+        label = label or technique.name
+        made = self._parts.get(label)
         if made is None or made.technique != technique:
             if made is not None:
                 made.close()
@@ -154,11 +163,11 @@ class View:
                 self.gpu,
                 self.scene,
                 self.size,
-                f"{self.owner}.{technique.name}",
+                f"{self.owner}.{label}",
                 technique,
                 make_world=self.make_world,
             )
-            self._parts[technique.name] = made
+            self._parts[label] = made
         made.images, made.scope, made.overlay, made.frame = self.images, self.scope, self.overlay, self.frame
         return made
 

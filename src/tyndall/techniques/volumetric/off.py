@@ -17,6 +17,7 @@ class Off(Technique):
 
     name: ClassVar[str] = "off"
     paper: ClassVar[str] = "none"
+    lights_air: ClassVar[bool] = False
     advice: ClassVar[str] = "The base image alone, to see what the air adds and costs."
 
     def render(self, view: View) -> None:

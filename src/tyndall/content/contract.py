@@ -1,0 +1,50 @@
+"""What every kind of scene content can do: meshes now; implicit surfaces, particles and terrain in the same words.
+
+Content draws itself into the G-buffer and draws its depth from a light; with these two it is seen, and casts and
+receives shadows by every technique that works on images. What consists of polygons can also describe its outline, from
+which shadow volumes and penumbra wedges are made; what cannot, or only in part, says so, and these techniques then take
+the shadow of the rest from a shadow map. Rays meet it through :mod:`tyndall.tracing`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Literal, Protocol
+
+from tyndall.gpu.resources import Bound, Resource
+
+if TYPE_CHECKING:
+    from tyndall.content.outline import Outline
+
+Cull = Literal["none", "front", "back"]
+Casters = Literal["all", "beside_outline"]
+
+
+class Content(Protocol):
+    """One kind of scene content on the device."""
+
+    def draw_gbuffer(self, native_pass: Any, scope: Mapping[str, Bound]) -> None:
+        """Draw into the G-buffer; ``scope`` binds ``camera``."""
+
+    def draw_depth(self, native_pass: Any, scope: Mapping[str, Bound], cull: Cull, casters: Casters = "all") -> None:
+        """Draw depth as a light sees it; ``scope`` binds ``shadow_layers`` and ``layer``.
+
+        Args:
+            cull: faces to leave out, as the light sees them, of what has faces.
+            casters: "beside_outline" leaves out what :meth:`outline` describes.
+        """
+
+    def outline(self) -> Outline | None:
+        """The adjacency of the polygons that it casts shadows with; None where it has none."""
+
+    def casts_beside_outline(self) -> bool:
+        """Whether something of it casts a shadow that :meth:`outline` does not describe."""
+
+    def resources(self) -> list[Resource]:
+        """What it holds on the device."""
+
+    def forget_bundles(self) -> None:
+        """Drop recorded draws, so that destroyed resources are not kept alive by them."""
+
+    def close(self) -> None:
+        """Free all device memory."""
