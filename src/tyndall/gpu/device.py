@@ -45,7 +45,7 @@ from tyndall.gpu.shader import Linked, Linker, create_module
 
 log = logging.getLogger("tyndall")
 
-_FEATURES = ("timestamp-query", "float32-blendable")
+_FEATURES = ("timestamp-query", "float32-blendable", "depth32float-stencil8")
 _LIMITS = (
     "max-texture-dimension-2d",
     "max-texture-dimension-3d",
@@ -148,6 +148,21 @@ ADD = Blend()
 
 
 @dataclass(frozen=True)
+class Stencil:
+    """What a fragment does to the stencil value: by the face it is of, and by the depth test.
+
+    Attributes:
+        front_pass, back_pass: where the depth test passes.
+        front_fail, back_fail: where it fails.
+    """
+
+    front_pass: str = "keep"
+    back_pass: str = "keep"
+    front_fail: str = "keep"
+    back_fail: str = "keep"
+
+
+@dataclass(frozen=True)
 class Raster:
     """Fixed-function state of a render pipeline.
 
@@ -156,6 +171,7 @@ class Raster:
         depth: depth format, or None.
         depth_compare: reversed-Z draws what is "greater".
         depth_bias, depth_slope_bias: added to the depth, in its smallest steps and per slope; triangles only.
+        stencil: what is done to the stencil values of a depth format that has them; None leaves them alone.
         cull: "none", "front" or "back"; front faces are counter-clockwise.
         vertex_buffers: per buffer, (stride, ((shader location, format, offset), …)).
     """
@@ -166,6 +182,7 @@ class Raster:
     depth_write: bool = True
     depth_bias: int = 0
     depth_slope_bias: float = 0.0
+    stencil: Stencil | None = None
     cull: str = "none"
     topology: str = "triangle-list"
     vertex_buffers: tuple[tuple[int, tuple[tuple[int, str, int], ...]], ...] = ()
@@ -349,6 +366,10 @@ class Gpu(Closing):
             if len(raw) > _UPLOAD_CHUNK:
                 self.device.queue.submit([])
 
+    def clear_buffer(self, buffer: Buffer) -> None:
+        """Fill a buffer with zeros, between the passes recorded before and after."""
+        self.encoder.clear_buffer(buffer.native)
+
     def dtype(self, struct: str) -> np.dtype[Any]:
         """The numpy layout of a WESL struct, by its path."""
         return self.linker.dtype(struct)
@@ -460,10 +481,12 @@ class Gpu(Closing):
         depth: tuple[Any, float | None] | None = None,
         *,
         depth_read_only: bool = False,
+        stencil: int | None = None,
     ) -> Iterator[Any]:
         """A render pass on native views. ``None`` as the clear value keeps what is there.
 
-        A read-only depth buffer is tested against, and shaders may read it in the same pass.
+        A read-only depth buffer is tested against, and shaders may read it in the same pass. ``stencil`` is what the
+        stencil values are cleared to, of a depth format that has them.
         """
         descriptor: dict[str, Any] = {
             "label": label,
@@ -489,6 +512,12 @@ class Gpu(Closing):
                     "depth_clear_value": clear_depth or 0.0,
                 }
             )
+            if stencil is not None:
+                descriptor["depth_stencil_attachment"] |= {
+                    "stencil_load_op": "clear",
+                    "stencil_store_op": "store",
+                    "stencil_clear_value": stencil,
+                }
         encoder = self.encoder
         if (stamps := self.timestamps(label)) is not None:
             descriptor["timestamp_writes"] = stamps
@@ -814,6 +843,12 @@ def _raster_descriptor(label: str, layout: Any, module: Any, entries: tuple[str,
             "depth_bias": state.depth_bias,
             "depth_bias_slope_scale": state.depth_slope_bias,
         }
+        if state.stencil is not None:
+            s = state.stencil
+            for face, passes, fails in (("front", s.front_pass, s.front_fail), ("back", s.back_pass, s.back_fail)):
+                descriptor["depth_stencil"][f"stencil_{face}"] = {
+                    "compare": "always", "pass_op": passes, "depth_fail_op": fails, "fail_op": "keep",
+                }  # fmt: skip
     return descriptor
 
 
@@ -841,6 +876,7 @@ __all__ = [
     "GpuError",
     "Raster",
     "Resource",
+    "Stencil",
     "Texture",
     "adapters",
     "choose_adapter",

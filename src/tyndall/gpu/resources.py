@@ -33,6 +33,7 @@ BYTES_PER_TEXEL = {
     "rg32uint": 8,
     "rgba32uint": 16,
     "depth32float": 4,
+    "depth32float-stencil8": 8,  # as drivers pad it
 }
 _NUMPY = {
     "r8unorm": (np.uint8, 1),
@@ -307,14 +308,27 @@ class Texture(Resource):
         if "sampled" not in self._bounds:
             suffix = self.dimension.replace("-", "_")
             depth = self.format.startswith("depth")
+            view = self._aspect("depth-only") if self.format.endswith("stencil8") else self.view()
             scalar = "u32" if self.format.endswith("uint") else "f32"
             wesl = f"texture_depth_{suffix}" if depth else f"texture_{suffix}<{scalar}>"
             kind = "depth" if depth else "uint" if scalar == "u32" else "float"
             if self.format in ("r32float", "rg32float", "rgba32float"):
                 kind = "unfilterable-float"
             layout = (("texture", (("sample_type", kind), ("view_dimension", self.dimension))),)
-            self._bounds["sampled"] = Bound(Slot(f"var {{name}}: {wesl};", layout, _ALL), self.view())
+            self._bounds["sampled"] = Bound(Slot(f"var {{name}}: {wesl};", layout, _ALL), view)
         return self._bounds["sampled"]
+
+    def stencil(self) -> Bound:
+        """The stencil values as ``texture_2d<u32>``."""
+        if "stencil" not in self._bounds:
+            layout = (("texture", (("sample_type", "uint"), ("view_dimension", "2d"))),)
+            slot = Slot("var {name}: texture_2d<u32>;", layout, _ALL)
+            self._bounds["stencil"] = Bound(slot, self._aspect("stencil-only"))
+        return self._bounds["stencil"]
+
+    def _aspect(self, aspect: str) -> Any:
+        format = {"depth-only": "depth32float", "stencil-only": "stencil8"}[aspect]
+        return self.native.create_view(dimension=self.dimension, aspect=aspect, format=format)
 
     def write(self) -> Bound:
         """As a write-only storage texture, in compute only."""

@@ -120,12 +120,14 @@ class View:
         assert isinstance(made, Texture)
         return made
 
-    def buffer(self, label: str, make: Callable[[], NDArray[Any]], *, element: str) -> Buffer:
-        """The technique's own storage buffer of this label; ``make`` gives its contents on first use."""
+    def buffer(
+        self, label: str, make: Callable[[], NDArray[Any] | int], *, element: str, usage: str = "storage"
+    ) -> Buffer:
+        """The technique's own buffer of this label; ``make`` gives its contents, or its bytes, on first use."""
         made = self._owned(
             label,
-            element,
-            lambda name: self.gpu.buffer(name, make(), owner=self.owner, element=element),
+            (element, usage),
+            lambda name: self.gpu.buffer(name, make(), owner=self.owner, element=element, usage=usage),
         )
         assert isinstance(made, Buffer)
         return made

@@ -3,5 +3,6 @@
 from tyndall.techniques.contract import Technique
 from tyndall.techniques.shadow.ray_traced import RayTraced
 from tyndall.techniques.shadow.shadow_map import ShadowMap
+from tyndall.techniques.shadow.shadow_volume import ShadowVolume
 
-MEMBERS: tuple[type[Technique], ...] = (ShadowMap, RayTraced)
+MEMBERS: tuple[type[Technique], ...] = (ShadowMap, ShadowVolume, RayTraced)

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from tyndall.content.contract import Casters, Content
 from tyndall.gpu.params import param
 from tyndall.scene.model import DirectionalLight, Light, PointLight, Scene, SpotLight, box_corners
 from tyndall.techniques.contract import Technique, View, Visibility
@@ -48,8 +49,8 @@ class ShadowMap(Technique):
     cull: Literal["none", "front", "back"] = param("none", doc="faces left out of the map", rebuild=True)
     filtering: Literal["nearest", "linear"] = param("linear", doc="one texel's answer, or four weighted")
 
-    def render(self, view: View, content: Sequence[Any]) -> Visibility:
-        """Draw all maps. ``content`` are the kinds of scene content, each with ``draw_depth``."""
+    def render(self, view: View, content: Sequence[Content], casters: Casters = "all") -> Visibility:
+        """Draw all maps of what casts."""
         count = sum(layer_count(light) for light in view.scene.lights)
         maps = view.texture(
             "maps", (self.size, self.size, max(1, count)), "depth32float", dimension="2d-array", usage="sampled target"
@@ -59,7 +60,7 @@ class ShadowMap(Technique):
             scope = {"shadow_layers": table, "layer": view.gpu.constant(index)}
             with view.gpu.render(view.owner, depth=(maps.view(layer=index), 0.0)) as native:
                 for kind in content:
-                    kind.draw_depth(native, scope, self.cull)
+                    kind.draw_depth(native, scope, self.cull, casters)
         return Visibility(
             self.shader(),
             self.shader(),
