@@ -25,7 +25,7 @@ shadow maps. Lights with a size cast the hard shadow of their centre.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Literal
 
 from tyndall.content.contract import Content
@@ -138,7 +138,9 @@ class Counter:
         }
         draws = [("side", 0, state)]
         if caps:
-            draws.append(("near_cap", 16, state))
+            # A cap lies in the surface that casts, which must not shade itself: it is moved behind by a few of the last
+            # places, since a triangle that faces away is drawn with its corners in another order.
+            draws.append(("near_cap", 16, replace(state, depth_bias=-8, depth_slope_bias=-0.001)))
             if not isinstance(view.scene.lights[silhouette.light], DirectionalLight):
                 draws.append(("far_cap", 16, state))
         for entry, offset, raster in draws:
