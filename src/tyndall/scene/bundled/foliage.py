@@ -1,8 +1,8 @@
 """`foliage`: a lemon tree in a pot and a vine on a whitewashed wall, in dappled sun.
 
-The hard case of alpha-masked casters: leaves are cut out of a texture on folded cards, are lit from both sides, and cast
-their shadows on each other and, over distances up to 3 m, on the wall and the paving. A technique that sees triangles
-only casts the shadows of the cards. With two lights or more, a spot light shines across the leaves from the
+The hard case of alpha-masked casters: leaves are cut out of a texture on folded cards, are lit from both sides, and
+cast their shadows on each other and, over distances up to 3 m, on the wall and the paving. A technique that sees
+triangles only casts the shadows of the cards. With two lights or more, a spot light shines across the leaves from the
 right; the others are suns.
 """
 

@@ -92,8 +92,8 @@ def _shade() -> Geometry:
 def _stand() -> Geometry:
     x, y, z = BULB
     foot = lathe(
-        [(0, 0), (0.16, 0), (0.165, 0.015), (0.13, 0.03), (0.03, 0.05), (0.012, 0.09), (0.012, y - 0.2), (0.022, y - 0.18),
-         (0.022, y - 0.08), (0, y - 0.08)], 28
+        [(0, 0), (0.16, 0), (0.165, 0.015), (0.13, 0.03), (0.03, 0.05), (0.012, 0.09), (0.012, y - 0.2),
+         (0.022, y - 0.18), (0.022, y - 0.08), (0, y - 0.08)], 28
     )  # fmt: skip
     return foot.at(x, 0, z)
 
@@ -177,8 +177,8 @@ def interior(lights: int = 1, seed: int = 0) -> Scene:
         base_color_texture=textures.wood(rng, "oak", (0.34, 0.21, 0.12), (0.50, 0.34, 0.20), size=256),
     )  # fmt: skip
 
-    def plain(name: str, color: Vec3, roughness: float = 0.5, **more: bool) -> Material:
-        return Material(name, (*color, 1), roughness=roughness, **more)
+    def plain(name: str, color: Vec3, roughness: float = 0.5, double_sided: bool = False) -> Material:
+        return Material(name, (*color, 1), roughness=roughness, double_sided=double_sided)
 
     floor, walls, skirting = _room()
     knot = torus_knot((2, 3), (0.21, 0.09, 0.062), 192, 24).placed(

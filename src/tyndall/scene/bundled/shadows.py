@@ -120,8 +120,8 @@ def _double_pyramid(triangles: int) -> Geometry:
     if triangles == 4:
         corners = np.array([(1, -1, -1), (-1, -1, 1), (1, 1, 1), (-1, 1, -1)]) / math.sqrt(3)
         indices = np.array([(0, 2, 1), (0, 3, 2), (0, 1, 3), (1, 2, 3)], np.uint32)
-        corners = (corners @ rotation("x", 0.6155)[:3, :3].T @ rotation("z", 0.7854)[:3, :3].T).astype(np.float32)
-        return faceted(Geometry(corners, corners, np.zeros((4, 2), np.float32), indices))
+        turned = (corners @ rotation("x", 0.6155)[:3, :3].T @ rotation("z", 0.7854)[:3, :3].T).astype(np.float32)
+        return Geometry(turned, turned, np.zeros((4, 2), np.float32), indices)
     cos, sin = _around(triangles // 2)
     return spindle(np.stack([cos, 0 * cos, -sin], -1)[None], (0, -1.15, 0), (0, 1.15, 0))
 
@@ -145,7 +145,7 @@ def _column(triangles: int) -> Geometry:
     rows, columns = (triangles // 8, 4) if triangles < 200 else _grid(triangles, 1.6, 6)
     t = np.linspace(-1, 1, rows)[:, None]
     cos, sin = _around(columns)
-    square = 1.0 if columns < 12 else (cos**8 + sin**8) ** -0.125
+    square = 1.36 if columns < 12 else (cos**8 + sin**8) ** -0.125
     end = (1 - np.abs(0.985 * t) ** 14) ** (1 / 3) if rows > 8 else 1.0
     turn = min(2.1, 0.3 * rows) * (t + 1) / 2
     x, z = 0.3 * square * end * cos, -0.3 * square * end * sin
@@ -249,10 +249,10 @@ def _room(odd: bool) -> list[Instance]:
 # Azimuth from +X towards +Z (the camera is at 45°) and elevation in degrees, and tint.
 _LIGHTS: tuple[tuple[float, float, Vec3], ...] = (
     (96, 38, (1.0, 0.90, 0.76)),
-    (2, 40, (0.72, 0.86, 1.0)),
-    (200, 66, (1.0, 0.76, 0.80)),
-    (60, 58, (0.86, 1.0, 0.84)),
-    (28, 17, (1.0, 0.74, 0.48)),
+    (2, 40, (0.60, 0.80, 1.0)),
+    (200, 66, (1.0, 0.66, 0.72)),
+    (60, 58, (0.76, 1.0, 0.74)),
+    (28, 17, (1.0, 0.66, 0.36)),
 )
 DISTANCE = 6.2  # of spots from the middle
 
