@@ -94,7 +94,10 @@ def test_techniques_of_a_family(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_scenes(capsys: pytest.CaptureFixture[str]) -> None:
     listed = {scene["name"]: scene["triangles"] for scene in run_json(capsys, "scenes")}
-    assert listed == {"box": 4968, "blinds": 607402, "courtyard": 5608441}
+    assert listed == {
+        "box": 4968, "blinds": 607402, "courtyard": 5608441,
+        "shadows": 1000, "foliage": 22334, "interior": 23396, "fence": 49894,
+    }  # fmt: skip
     code, out, _ = run(capsys, "scenes")
     assert code == 0
     assert "5,608,441" in out
@@ -214,6 +217,14 @@ def test_lights_are_placed_in_a_bundled_scene(capsys: pytest.CaptureFixture[str]
     ]
     one, three = (pixels_of(folder / image) for image in images)
     assert not np.array_equal(one, three)
+
+
+def test_a_scene_may_be_asked_for_any_number_of_triangles(capsys: pytest.CaptureFixture[str], folder: Path) -> None:
+    words = ("--size", "16x9", "--frames", "1", "--technique", "off")
+    document = run_json(capsys, "render", "shadows:137", *words)
+    assert (document["triangles"], document["image"]) == (137, "out/shadows-137/off.png")
+    code, _, err = run(capsys, "render", "shadows:7", *words)
+    assert (code, err) == (2, "triangles: 7 is outside 10 … 10000000\n")
 
 
 def test_bench_writes_its_figures_as_json_and_as_tables(

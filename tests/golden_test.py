@@ -97,12 +97,15 @@ def lamps() -> Scene:
     )
 
 
-def box() -> Scene:
-    """The bundled scene."""
-    return bundled.box()
-
-
-SCENES: dict[str, Callable[[], Scene]] = {"shafts": shafts, "lamps": lamps, "box": box}
+SCENES: dict[str, Callable[[], Scene]] = {
+    "shafts": shafts,
+    "lamps": lamps,
+    "box": bundled.box,
+    "shadows": bundled.shadows,
+    "foliage": bundled.foliage,
+    "interior": bundled.interior,
+    "fence": bundled.fence,
+}
 _SMALL = {"froxel": {"grid": (96, 54, 64)}, "march": {"steps": 64}}
 CASES = [
     ("shafts", "off", {}),
@@ -123,11 +126,17 @@ CASES = [
 ]
 
 
-# What rays do to surfaces, and to the air: the scene, whether its lights have a size, and the techniques.
-TRACED: dict[str, tuple[str, bool, dict[str, str]]] = {
+# What rays and other shadows do to surfaces, and to the air: the scene, whether its lights are given a size, and the
+# techniques. The hard scenes' lights have sizes of their own.
+SHADOWED: dict[str, tuple[str, bool, dict[str, str]]] = {
     "shafts-ray_traced": ("shafts", False, {"volumetric": "froxel", "shadow": "ray_traced"}),
     "shafts-ray_traced-soft": ("shafts", True, {"volumetric": "froxel", "shadow": "ray_traced"}),
     "lamps-ray_traced-soft": ("lamps", True, {"volumetric": "off", "shadow": "ray_traced"}),
+    **{
+        f"{name}-{shadow}": (name, False, {"volumetric": "off", "shadow": shadow})
+        for name in ("shadows", "foliage", "interior", "fence")
+        for shadow in ("shadow_map", "ray_traced")
+    },
     "box-ray_traced_ao": ("box", False, {"volumetric": "off", "shadow": "ray_traced", "occlusion": "ray_traced_ao"}),
 }
 
@@ -174,9 +183,9 @@ def test_picture(software: Gpu, name: str, technique: str, changes: dict[str, st
     compare(got, FOLDER / ("-".join([name, technique, *changes.values()]) + ".png"), tmp_path)
 
 
-@pytest.mark.parametrize("title", TRACED)
-def test_picture_with_rays(software: Gpu, title: str, tmp_path: Path) -> None:
-    name, soft, families = TRACED[title]
+@pytest.mark.parametrize("title", SHADOWED)
+def test_picture_with_shadows(software: Gpu, title: str, tmp_path: Path) -> None:
+    name, soft, families = SHADOWED[title]
     what = scene(name)
     if soft:
         what = what.with_(lights=tuple(map(with_size, what.lights)))
@@ -223,5 +232,5 @@ def test_a_small_fault_is_seen(software: Gpu) -> None:
 
 def test_no_golden_is_left_over() -> None:
     known = {"-".join([name, technique, *changes.values()]) + ".png" for name, technique, changes in CASES}
-    known |= {f"{title}.png" for title in TRACED}
+    known |= {f"{title}.png" for title in SHADOWED}
     assert {p.name for p in FOLDER.iterdir()} == known

@@ -32,6 +32,14 @@ def open_edges(positions: NDArray[Any], indices: NDArray[Any]) -> int:
     return int(np.abs(balance).sum())
 
 
+def manifold(positions: NDArray[Any], indices: NDArray[Any]) -> bool:
+    """Whether exactly two triangles meet on every edge, once each way, and no triangle is without an edge's length."""
+    corners = _welded(positions, indices)
+    start, end = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
+    directed = np.unique(start * (int(corners.max()) + 1) + end)
+    return len(corners) == len(indices) and len(directed) == 3 * len(corners) and open_edges(positions, indices) == 0
+
+
 def volume(positions: NDArray[Any], indices: NDArray[Any]) -> float:
     """Volume that a closed surface encloses, negative if it is wound inwards: Σ a·(b × c) / 6 (divergence theorem)."""
     a, b, c = (positions[indices[:, k]].astype(np.float64) for k in range(3))

@@ -46,7 +46,12 @@ app.add_typer(bench, name="bench")
 app.command()(report_command.report)
 app.command()(sweep_command.sweep)
 
-SceneName = Annotated[str, typer.Argument(metavar="SCENE", help="A bundled scene, a scene JSON, or a mesh file.")]
+SceneName = Annotated[
+    str,
+    typer.Argument(
+        metavar="SCENE", help="A bundled scene (shadows:1000 has 1,000 triangles), a scene JSON, or a mesh file."
+    ),
+]
 Size = Annotated[str, typer.Option(metavar="WxH", help="Width and height of the picture in pixels.")]
 Shadow = Annotated[str | None, typer.Option(metavar="NAME", help="Shadow technique.")]
 Occlusion = Annotated[str | None, typer.Option(metavar="NAME", help="Technique of ambient occlusion.")]
@@ -122,7 +127,7 @@ def render(
     parameters = _parameters(context.obj.flags, "volumetric", [technique], families, model)
     with console.Work("loading") as work:
         described = open_scene(scene, lights)
-        folder = out or Path("out", Path(scene).stem)  # not the name in a file, which may be a path
+        folder = out or Path("out", Path(scene.replace(":", "-")).stem)  # not the name in a file, which may be a path
         from tyndall.lab.picture import check_folder
         from tyndall.lab.render import render as draw
 
@@ -220,7 +225,7 @@ def compare(
     techniques: dict[str, Any] = {**others, family: chosen}
     with console.Work("loading") as work:
         described = open_scene(scene, lights)
-        folder = out or Path("out", Path(scene).stem)  # not the name in a file, which may be a path
+        folder = out or Path("out", Path(scene.replace(":", "-")).stem)  # not the name in a file, which may be a path
         from tyndall.lab.compare import compare as measure
 
         comparison = measure(

@@ -135,19 +135,22 @@ def convert(f: Field, value: Any) -> Any:
         if (f.param.low is not None and component < f.param.low) or (
             f.param.high is not None and component > f.param.high
         ):
-            raise ParameterError(f"{f.name}: {component:g} is outside {describe_range(f.param)}")
+            raise ParameterError(f"{f.name}: {_digits(component)} is outside {describe_range(f.param)}")
     return result
 
 
 def describe_range(p: Param) -> str:
     """``1 … 4096``, ``≥ 0``, ``≤ 1`` or ``any``."""
-    if p.low is None and p.high is None:
-        return "any"
-    if p.high is None:
-        return f"≥ {p.low:g}"
     if p.low is None:
-        return f"≤ {p.high:g}"
-    return f"{p.low:g} … {p.high:g}"
+        return "any" if p.high is None else f"≤ {_digits(p.high)}"
+    if p.high is None:
+        return f"≥ {_digits(p.low)}"
+    return f"{_digits(p.low)} … {_digits(p.high)}"
+
+
+def _digits(number: float) -> str:
+    """A whole number with all of its digits, or 10,000,001 would be outside 10 … 1e+07; others with six."""
+    return f"{number:.12g}" if number == int(number) else f"{number:g}"
 
 
 def describe_type(tp: Any) -> str:

@@ -16,14 +16,15 @@ def open_scene(name: str, lights: int | None = None) -> Scene:
     """The scene that ``name`` stands for; a mesh file is put on a stage, with a camera, a light and a medium.
 
     Args:
-        name: a bundled scene's name, or the path of a file.
+        name: a bundled scene's name, with ``:`` and a number of triangles where it has any (``shadows:100000``), or
+            the path of a file.
         lights: how many lights; only a bundled scene places them.
 
     Raises:
         ParameterError: neither a scene nor a file, or a number of lights that the scene does not take.
         SceneError: the file is wrong.
     """
-    make = bundled.SCENES.get(name)
+    make = bundled.named(name)
     if make is not None:
         return make() if lights is None else make(lights=lights)
     path = Path(name)

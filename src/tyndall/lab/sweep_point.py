@@ -114,7 +114,7 @@ class Station(Closing):
         key = (name, lights, expected)
         if self._scene is None or self._scene[0] != key:
             self._forget()
-            scene = open_scene(name, lights if name in bundled.SCENES else None)
+            scene = open_scene(name, lights if bundled.named(name) is not None else None)
             if scene_hash(scene) != expected:
                 raise ParameterError(f"scene: {name} is not what it was when the sweep was planned")
             self._scene = key, scene

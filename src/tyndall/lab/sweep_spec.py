@@ -528,7 +528,7 @@ class _Scenes:
 
     def resolve(self, name: str) -> str:
         """The scene's name as a worker can use it: a path that does not depend on the working directory."""
-        if name in bundled.SCENES:
+        if bundled.named(name) is not None:
             return name
         return str(((self._folder or Path()) / name).absolute())
 
@@ -542,7 +542,7 @@ class _Scenes:
         key = (name, lights)
         if key not in self._made:
             resolved = self.resolve(name)
-            scene = open_scene(resolved if Path(resolved).exists() or name in bundled.SCENES else name, lights)
+            scene = open_scene(resolved if Path(resolved).exists() else name, lights)
             self._made[key] = (scene, scene_hash(scene))
         return self._made[key]
 
@@ -554,7 +554,7 @@ class _Scenes:
         for i, name in names:
             if not isinstance(name, str) or not name:
                 continue
-            if counts and name not in bundled.SCENES:  # a file that is wrong says more than that it has its own lights
+            if counts and bundled.named(name) is None:  # a file that is wrong says more than that it has its own lights
                 found = list(self._tried(name, None, ("scenes", *i), ("lights",)))
                 yield from found
                 if found:

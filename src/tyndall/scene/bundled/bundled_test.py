@@ -12,19 +12,31 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from solids import face_normals, open_edges, volume
+from solids import face_normals, manifold, open_edges, volume
 
 from tyndall.gpu.params import ParameterError
-from tyndall.scene.bundled import SCENES, TRIANGLES, blinds, box, courtyard
+from tyndall.scene.bundled import SCENES, TRIANGLES, blinds, box, courtyard, fence, foliage, interior, named, shadows
 from tyndall.scene.bundled.box import FRONT, HEIGHT, OCULUS, OCULUS_RADIUS, SUN
-from tyndall.scene.model import DirectionalLight, Mesh, Scene
+from tyndall.scene.bundled.fence import BAR, PITCH, SUN_DIAMETER
+from tyndall.scene.bundled.fence import SUN as LATE_SUN
+from tyndall.scene.bundled.fence import ground as dunes
+from tyndall.scene.bundled.interior import BULB, BULB_RADIUS
+from tyndall.scene.bundled.shadows import CENTRE, ILLUMINANCE
+from tyndall.scene.model import DirectionalLight, Mesh, PointLight, Scene, SpotLight, box_corners
 
 Floats = NDArray[np.floating[Any]]
 
-# Surfaces without thickness: painted planes, foliage, water's jets excepted.
+# Surfaces without thickness, by scene: painted planes, foliage, water's jets excepted.
 OPEN = {
-    "blackboard", "cobbles", "foliage", "shrub", "fern", "bougainvillea", "fallen leaves", "grass",
-}  # fmt: skip
+    "box": set(),
+    "blinds": {"blackboard"},
+    "courtyard": {"cobbles", "foliage", "shrub", "fern", "bougainvillea", "fallen leaves", "grass"},
+    "shadows": {"floor", "left wall", "right wall"},
+    "foliage": {"tree leaves", "vine leaves", "bough leaves"},
+    "interior": {"lampshade"},
+    "fence": set(),
+}
+AIRY = ("box", "blinds", "courtyard")  # those of S1, with a medium
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -36,6 +48,11 @@ def _own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 
 @pytest.fixture(scope="module", params=list(SCENES))
 def scene(request: pytest.FixtureRequest) -> Scene:
+    return SCENES[request.param]()
+
+
+@pytest.fixture(scope="module", params=AIRY)
+def airy(request: pytest.FixtureRequest) -> Scene:
     return SCENES[request.param]()
 
 
@@ -57,13 +74,18 @@ def _digest(scene: Scene) -> str:
 
 
 def test_triangle_count_is_exact(scene: Scene) -> None:
-    expected = {"box": 4_968, "blinds": 607_402, "courtyard": 5_608_441}
+    expected = {
+        "box": 4_968, "blinds": 607_402, "courtyard": 5_608_441,
+        "shadows": 1_000, "foliage": 22_334, "interior": 23_396, "fence": 49_894,
+    }  # fmt: skip
     assert expected == TRIANGLES
     assert scene.triangle_count == expected[scene.name]
 
 
 @pytest.mark.parametrize(
-    ("name", "seed"), [("box", 1), ("box", 2**32 - 1), ("blinds", 1), ("blinds", 2), ("blinds", 3)]
+    ("name", "seed"),
+    [("box", 1), ("box", 2**32 - 1), ("blinds", 1), ("blinds", 2), ("blinds", 3)]
+    + [(name, seed) for name in ("shadows", "foliage", "interior", "fence") for seed in (1, 2**32 - 1)],
 )
 def test_every_seed_has_the_exact_count(name: str, seed: int) -> None:
     assert SCENES[name](seed=seed).triangle_count == TRIANGLES[name]
@@ -75,7 +97,7 @@ def test_same_bits_for_a_seed(scene: Scene, tmp_path: Path, monkeypatch: pytest.
 
 
 def test_seeds_differ() -> None:
-    for make in (box, blinds):
+    for make in (box, blinds, shadows, foliage, interior, fence):
         assert _digest(make(seed=1)) != _digest(make(seed=0))
 
 
@@ -90,7 +112,7 @@ def test_normals_are_unit_and_textures_finite(scene: Scene) -> None:
 
 def test_solids_are_closed_and_wound_outwards(scene: Scene) -> None:
     for mesh in _meshes(scene):
-        if mesh.name not in OPEN:
+        if mesh.name not in OPEN[scene.name]:
             assert open_edges(mesh.positions, mesh.indices) == 0, mesh.name
             assert volume(mesh.positions, mesh.indices) > 0, mesh.name
 
@@ -108,7 +130,8 @@ def test_instances_are_turned_not_mirrored(scene: Scene) -> None:
     assert all(np.linalg.det(np.asarray(i.transform)[:3, :3]) > 0 for i in scene.instances)
 
 
-def test_medium_encloses_the_scene_and_the_camera(scene: Scene) -> None:
+def test_medium_encloses_the_scene_and_the_camera(airy: Scene) -> None:
+    scene = airy
     assert scene.medium.bounds is not None
     low, high = np.asarray(scene.medium.bounds)
     assert (low <= scene.bounds[0] + 1e-5).all()
@@ -118,8 +141,8 @@ def test_medium_encloses_the_scene_and_the_camera(scene: Scene) -> None:
     assert min(scene.medium.scattering) > 0
 
 
-def test_looks_carry_s1s_parameters(scene: Scene) -> None:
-    assert {technique: set(look) for technique, look in scene.looks.items()} == {
+def test_looks_carry_s1s_parameters(airy: Scene) -> None:
+    assert {technique: set(look) for technique, look in airy.looks.items()} == {
         "screen_space": {"exposure", "decay", "weight"},
         "polygonal": {"g", "tau"},
         "froxel": {"g", "z_limit", "density", "c_s"},
@@ -299,3 +322,237 @@ def test_courtyard_is_read_from_its_cache(monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setattr(sys.modules["tyndall.scene.bundled.courtyard"], "_model", None)
     foliage = next(i.mesh for i in courtyard().instances if i.name == "foliage")
     assert isinstance(foliage.positions.base, np.memmap) or isinstance(foliage.positions, np.memmap)
+
+
+# --- scenes for shadows -------------------------------------------------------------------------------------------
+
+SIZES = (10, 11, 12, 13, 14, 22, 37, 58, 99, 100, 149, 373, 374, 375, 1_000, 2_001, 10_000, 100_000)
+
+
+@pytest.mark.parametrize("triangles", SIZES)
+def test_shadows_has_as_many_triangles_as_asked_for_on_closed_sculptures(triangles: int) -> None:
+    scene = shadows(triangles=triangles)
+    assert scene.triangle_count == triangles
+    planes = [i.mesh for i in scene.instances if i.name in OPEN["shadows"]]
+    sculptures = [i.mesh for i in scene.instances if i.name not in OPEN["shadows"]]
+    assert [plane.triangle_count for plane in planes] == [2 + triangles % 2, 2, 2]
+    assert 1 <= len(sculptures) <= 8
+    for mesh in sculptures:
+        assert manifold(mesh.positions, mesh.indices), mesh.name
+        assert volume(mesh.positions, mesh.indices) > 0, mesh.name
+        assert mesh.bounds[0][1] > 0, mesh.name  # above the floor
+        corners = mesh.positions[mesh.indices].astype(np.float64)
+        area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+        assert (area > 0).all(), mesh.name
+
+
+def test_shadows_keeps_its_forms_as_it_grows() -> None:
+    """More triangles are nearer to the same forms, not other ones: their volumes converge, from below or above."""
+    volumes = []
+    for triangles in (1_000, 10_000, 100_000, 400_000):
+        sculptures = [i.mesh for i in shadows(triangles=triangles).instances if i.name not in OPEN["shadows"]]
+        volumes.append([volume(mesh.positions, mesh.indices) for mesh in sculptures])
+    coarse, middle, fine, finest = np.array(volumes)
+    assert (abs(coarse / finest - 1) < 0.55).all()
+    assert (abs(middle / finest - 1) < 0.08).all()
+    assert (abs(fine / finest - 1) < 0.008).all()
+
+
+def test_smooth_sculptures_share_their_vertices() -> None:
+    for instance in shadows(triangles=100_000).instances:
+        if instance.name not in OPEN["shadows"]:
+            mesh = instance.mesh
+            assert len(np.unique(mesh.positions, axis=0)) == len(mesh.positions)
+            assert len(mesh.positions) in (mesh.triangle_count // 2, mesh.triangle_count // 2 + 2)  # Euler: torus, ball
+
+
+@pytest.mark.parametrize("count", [1, 2, 5, 32])
+def test_lights_of_shadows_are_spots_and_suns_that_share_one_illuminance(count: int) -> None:
+    scene = shadows(lights=count)
+    assert [type(light) for light in scene.lights] == [(SpotLight, DirectionalLight)[k % 2] for k in range(count)]
+    total = 0.0
+    for light in scene.lights:
+        if isinstance(light, SpotLight):
+            away = CENTRE - light.position
+            distance = float(np.linalg.norm(away))
+            assert away @ light.direction == pytest.approx(distance)  # its axis meets the middle
+            assert min(light.position[0], light.position[2]) > 0  # before both walls
+            total += light.intensity / distance**2
+        else:
+            assert isinstance(light, DirectionalLight)
+            assert light.direction[1] < 0
+            total += light.intensity
+    assert total == pytest.approx(ILLUMINANCE)
+    assert len({light.color for light in scene.lights}) == count
+
+
+def test_each_light_of_shadows_casts_the_sculptures_on_the_room() -> None:
+    scene = shadows(triangles=400, lights=5)
+    sculptures = _world(scene, *(i.name for i in scene.instances if i.name not in OPEN["shadows"]))
+    rng = np.random.default_rng(0)
+    floor = rng.uniform((0.5, 0.001, 0.5), (7.0, 0.001, 7.0), (200, 3))
+    walls = rng.uniform((0.001, 0.2, 0.3), (0.001, 4.5, 7.0), (200, 3))
+    points = np.concatenate([floor, walls, walls[:, ::-1] * (1, 0, 1) + walls * (0, 1, 0)])
+    planes = _world(scene, *OPEN["shadows"])
+    for light in scene.lights:
+        if isinstance(light, DirectionalLight):
+            ends = points - 30 * np.array(light.direction)
+        else:
+            assert isinstance(light, SpotLight)
+            ends = np.broadcast_to(light.position, points.shape)
+        assert 0.05 < _blocked(points, ends, sculptures).mean() < 0.6
+        assert not _blocked(points, ends, planes).any()  # no wall stands before a light
+
+
+@pytest.mark.parametrize("triangles", [-1, 0, 9, 10.5, 10_000_001])
+def test_a_wrong_number_of_triangles_is_one_line(triangles: Any) -> None:
+    with pytest.raises(ParameterError, match=r"^triangles: .*(outside 10 … 10000000|not a whole number)") as caught:
+        shadows(triangles=triangles)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_name_may_hold_a_number_of_triangles() -> None:
+    make = named("shadows:12345")
+    assert make is not None
+    scene = make(lights=2, seed=3)
+    assert (scene.triangle_count, len(scene.lights)) == (12_345, 2)
+    assert _digest(scene) == _digest(shadows(triangles=12_345, lights=2, seed=3))
+    assert named("shadows") is shadows
+    assert named("shade:100") is None
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("shadows:", "triangles: '' is no number of them"),
+        ("shadows:many", "triangles: 'many' is no number of them"),
+        ("shadows:-5", "triangles: '-5' is no number of them"),
+        ("shadows:" + "9" * 5000, "triangles: '999"),
+        ("shadows:9", "triangles: 9 is outside 10 …"),
+        ("box:100", "triangles: box has 4,968; only shadows"),
+    ],
+)
+def test_a_wrong_number_in_a_name_is_one_line(name: str, message: str) -> None:
+    make = named(name)
+    assert make is not None
+    with pytest.raises(ParameterError) as caught:
+        make()
+    assert str(caught.value).startswith(message)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["foliage", "interior", "fence"])
+@pytest.mark.parametrize("count", [1, 2, 7, 32])
+def test_hard_scenes_have_as_many_lights_as_asked_for(name: str, count: int) -> None:
+    one, many = SCENES[name](), SCENES[name](lights=count)
+    assert len(many.lights) == count
+    assert len({light.color for light in many.lights}) == (count if name != "interior" else min(count, 3))
+    assert all(light.extent > 0 for light in many.lights)  # each has a size
+    assert _digest(many.with_(lights=one.lights)) == _digest(one)
+
+
+def test_bars_of_the_fence_are_thinner_than_a_texel_and_stand_in_grazing_light() -> None:
+    scene = fence()
+    forward = np.array(LATE_SUN) / np.linalg.norm(LATE_SUN)
+    assert math.radians(5) < math.asin(-forward[1]) < math.radians(15)
+    across = np.cross(forward, (0, 1, 0))
+    across /= np.linalg.norm(across)
+    seen = box_corners(*scene.bounds) @ np.stack([across, np.cross(across, forward)], 1)
+    texel = float(np.ptp(seen, axis=0).max()) / 1024
+    assert 0.7 * texel > 2 * BAR
+    (light,) = scene.lights
+    assert isinstance(light, DirectionalLight)
+    assert light.angular_diameter == SUN_DIAMETER == pytest.approx(2 * 696e6 / 149.6e9, rel=0.01)
+
+
+def test_each_bar_of_the_fence_draws_its_shadow() -> None:
+    """Along a line on the ground beside the fence, shadow and light take turns as often as there are bars."""
+    scene = fence()
+    x = np.linspace(-0.6, 0.9, 1500)
+    z = np.full_like(x, 0.5)
+    points = np.stack([x, dunes(x, z) + 0.02, z], 1)
+    shade = _in_shadow(points, np.array(LATE_SUN), _world(scene, "bars"))
+    shadows_seen = np.count_nonzero(np.diff(shade.astype(int)) > 0)
+    assert 0.04 < shade.mean() < 0.4
+    assert shadows_seen >= 0.7 * 1.5 / PITCH * abs(LATE_SUN[2]) / math.hypot(LATE_SUN[0], LATE_SUN[2])
+
+
+def test_leaves_are_cut_out_of_their_cards_and_shade_the_wall() -> None:
+    scene = foliage()
+    leaves = [i.mesh for i in scene.instances if i.name in OPEN["foliage"]]
+    for mesh in leaves:
+        assert mesh.material.alpha_mode == "mask"
+        assert mesh.material.double_sided
+        assert mesh.material.base_color_texture is not None
+        alpha = mesh.material.base_color_texture.image.pixels[..., 3]
+        assert 0.1 < np.mean(alpha > 127) < 0.6
+        assert set(np.unique(alpha)) == {0, 255}
+        assert mesh.uvs is not None
+        assert np.ptp(mesh.uvs, axis=0) == pytest.approx((1, 1))
+    light = scene.lights[0]
+    assert isinstance(light, DirectionalLight)
+    wall = np.random.default_rng(0).uniform((-1.5, 0.5, 0.001), (2.0, 2.5, 0.001), (300, 3))
+    assert 0.1 < _in_shadow(wall, np.array(light.direction), _world(scene, *OPEN["foliage"])).mean() < 0.8
+
+
+def test_camera_of_interior_is_inside_the_shadow_of_a_closed_solid() -> None:
+    """No point of the bulb is seen from the camera or from its near plane: the table top hides it."""
+    scene = interior()
+    (light,) = scene.lights
+    assert isinstance(light, PointLight)
+    assert (light.position, light.radius) == (BULB, BULB_RADIUS)
+    table = _world(scene, "table")
+    ends = np.array(BULB) + np.concatenate([np.zeros((1, 3)), BULB_RADIUS * np.eye(3), -BULB_RADIUS * np.eye(3)])
+    for start in scene.camera.position + 0.02 * np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)]):
+        assert _blocked(np.broadcast_to(start, ends.shape), ends, table).all()
+    # The volume counts: from the lit middle of the room to the camera a ray enters it once more than it leaves it.
+    lit = np.array((0.3, 0.3, 0.3))
+    assert not _blocked(lit[None], np.array(BULB)[None], _world(scene)).any()
+
+
+def test_interior_is_closed_and_its_lampshade_is_open() -> None:
+    scene = interior()
+    walls = _world(scene, "walls", "floor")
+    rng = np.random.default_rng(0)
+    out = rng.normal(size=(2000, 3))
+    out *= 20 / np.linalg.norm(out, axis=1, keepdims=True)
+    start = np.broadcast_to((0.0, 1.2, 0.0), out.shape)
+    assert _blocked(start, start + out, walls).all()
+    shade = next(i.mesh for i in scene.instances if i.name == "lampshade")
+    assert open_edges(shade.positions, shade.indices) == 2 * 72  # the rims above and below
+    assert shade.material.double_sided
+    bulb = np.broadcast_to(BULB, out.shape)
+    escapes = ~_blocked(bulb, bulb + out, _world(scene, "lampshade"))
+    assert 0.1 < escapes.mean() < 0.8
+    assert escapes[out[:, 1] > 19].all()
+    assert escapes[out[:, 1] < -19].all()
+
+
+def test_curves_of_interior_shade_themselves() -> None:
+    scene = interior()
+    for name in ("knot", "ribbon"):
+        part = _world(scene, name)
+        centres = part.mean(axis=1)
+        normal = np.cross(part[:, 1] - part[:, 0], part[:, 2] - part[:, 0])
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        facing = np.einsum("ij,ij->i", normal, np.array(BULB) - centres) > 0.1
+        start = (centres + 0.004 * normal)[facing][::7]
+        assert 0.02 < _blocked(start, np.broadcast_to(BULB, start.shape), part).mean() < 0.7, name
+
+
+def _blocked(starts: Floats, ends: Floats, triangles: Floats) -> NDArray[np.bool_]:
+    """Whether a triangle crosses each segment (Möller and Trumbore 1997)."""
+    a, edge1, edge2 = triangles[:, 0], triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+    blocked = np.zeros(len(starts), bool)
+    for k, (start, end) in enumerate(zip(starts, ends, strict=True)):
+        way = np.asarray(end - start, np.float64)
+        p = np.cross(way, edge2)
+        determinant = np.einsum("ij,ij->i", edge1, p)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            s = start - a
+            u = np.einsum("ij,ij->i", s, p) / determinant
+            q = np.cross(s, edge1)
+            v = q @ way / determinant
+            t = np.einsum("ij,ij->i", edge2, q) / determinant
+            blocked[k] = bool(((u >= 0) & (v >= 0) & (u + v <= 1) & (t > 1e-6) & (t < 1)).any())
+    return blocked

@@ -529,6 +529,87 @@ def slab_with_oculus(
     return merge(parts)
 
 
+# --- seamless solids ----------------------------------------------------------------------------------------------
+
+
+def ring(points: Floats) -> Geometry:
+    """A smooth closed surface through a (rows, columns, 3) grid that wraps both ways, as a torus; no vertex is twice.
+
+    The normal is ∂column × ∂row, 2·rows·columns triangles. Without a seam there are no texture coordinates: uv is 0.
+    """
+    rows, columns = points.shape[:2]
+    a = np.arange(rows * columns, dtype=np.uint32).reshape(rows, columns)
+    return _smooth(points.reshape(-1, 3), _quads(np.concatenate([a, a[:1]])))
+
+
+def spindle(points: Floats, first: ArrayLike, last: ArrayLike) -> Geometry:
+    """A smooth closed surface through a (rows, columns, 3) grid of rings and a pole at each end; no vertex is twice.
+
+    As :func:`ring`, with 2·rows·columns triangles: a ball, a bar along a curve, or, of one row, a double pyramid.
+    """
+    rows, columns = points.shape[:2]
+    a = np.arange(rows * columns, dtype=np.uint32).reshape(rows, columns)
+    low, high = np.full(columns, rows * columns, np.uint32), np.full(columns, rows * columns + 1, np.uint32)
+    bottom = np.stack([low, np.roll(a[0], -1), a[0]], 1)
+    top = np.stack([high, a[-1], np.roll(a[-1], -1)], 1)
+    poles = np.stack([np.asarray(first, np.float64), np.asarray(last, np.float64)])
+    return _smooth(np.concatenate([points.reshape(-1, 3), poles]), np.concatenate([bottom, _quads(a), top]))
+
+
+def _quads(corner: NDArray[np.uint32]) -> NDArray[np.uint32]:
+    """(T, 3) triangles between the rows of (rows, columns) vertex numbers, whose columns wrap."""
+    a, d = corner[:-1], corner[1:]
+    b, c = np.roll(a, -1, axis=1), np.roll(d, -1, axis=1)
+    return np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)])
+
+
+def _smooth(points: Floats, indices: NDArray[np.uint32]) -> Geometry:
+    positions = points.astype(np.float32)
+    return Geometry(positions, vertex_normals(positions, indices), np.zeros((len(positions), 2), np.float32), indices)
+
+
+def faceted(part: Geometry) -> Geometry:
+    """The same triangles with vertices of their own and their plane's normals."""
+    corners = part.positions[part.indices]
+    normals = _unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+    count = len(part.indices)
+    return Geometry(
+        corners.reshape(-1, 3),
+        np.repeat(normals, 3, axis=0),
+        part.uvs[part.indices].reshape(-1, 2),
+        np.arange(3 * count, dtype=np.uint32).reshape(-1, 3),
+    )
+
+
+def torus_knot(turns: tuple[int, int], radii: tuple[float, float, float], rows: int, columns: int) -> Geometry:
+    """A round tube along a knot on a torus about +Z.
+
+    Args:
+        turns: p about the axis and q through the hole; without a common divisor. (2, 3) is the trefoil.
+        radii: of the torus' middle circle, of its tube, and of the knot's own tube.
+        rows, columns: along and around the tube.
+    """
+    p, q = turns
+    large, small, thick = radii
+    t = np.arange(rows) * (2 * math.pi / rows)
+
+    def curve(t: Floats) -> Floats:
+        distance = large + small * np.cos(q * t)
+        return np.stack([distance * np.cos(p * t), distance * np.sin(p * t), -small * np.sin(q * t)], -1)
+
+    # The torus' own normal closes after one round, as a frame carried along the curve does not.
+    centre = np.stack([large * np.cos(p * t), large * np.sin(p * t), 0 * t], -1)
+    line = curve(t)
+    tangent = curve(t + 1e-4) - curve(t - 1e-4)
+    tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
+    side = line - centre
+    side -= tangent * np.einsum("ij,ij->i", side, tangent)[:, None]
+    side /= np.linalg.norm(side, axis=1, keepdims=True)
+    angle = np.arange(columns) * (2 * math.pi / columns)
+    around = side[:, None] * np.cos(angle)[:, None] + np.cross(tangent, side)[:, None] * np.sin(angle)[:, None]
+    return ring(line[:, None] + thick * around)
+
+
 # --- implicit surfaces --------------------------------------------------------------------------------------------
 
 Field = Callable[[Floats], Floats]

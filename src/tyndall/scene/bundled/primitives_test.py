@@ -7,13 +7,14 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from solids import face_normals, open_edges, volume
+from solids import face_normals, manifold, open_edges, volume
 
 from tyndall.scene.bundled import primitives
 from tyndall.scene.bundled.primitives import (
     Geometry,
     ball,
     cuboid,
+    faceted,
     lathe,
     merge,
     pierced_wall,
@@ -23,12 +24,15 @@ from tyndall.scene.bundled.primitives import (
     refine,
     repeat,
     ribbon_solid,
+    ring,
     rotation,
     rounded_box,
     scaling,
     slab_with_oculus,
     smooth_path,
+    spindle,
     surface_nets,
+    torus_knot,
     translation,
     tube,
 )
@@ -47,6 +51,26 @@ def _arch() -> Geometry:
 
 def _sphere(p: primitives.Floats) -> primitives.Floats:
     return np.asarray(np.linalg.norm(p, axis=-1) - 0.5)
+
+
+def _doughnut() -> Geometry:
+    u, v = (np.arange(n) * (2 * math.pi / n) for n in (96, 48))
+    distance = 1 + 0.3 * np.cos(v)
+    return ring(
+        np.stack([distance * np.cos(u)[:, None], distance * np.sin(u)[:, None], -0.3 * np.sin(v) + 0 * u[:, None]], -1)
+    )
+
+
+def _double_pyramid() -> Geometry:
+    a = np.arange(5) * (2 * math.pi / 5)
+    return spindle(np.stack([np.cos(a), 0 * a, -np.sin(a)], -1)[None], (0, -1, 0), (0, 2, 0))
+
+
+def _trefoil_length() -> float:
+    t = np.linspace(0, 2 * math.pi, 100_001)
+    distance = 1 + 0.4 * np.cos(3 * t)
+    curve = np.stack([distance * np.cos(2 * t), distance * np.sin(2 * t), 0.4 * np.sin(3 * t)], 1)
+    return float(np.linalg.norm(np.diff(curve, axis=0), axis=1).sum())
 
 
 SOLIDS: dict[str, tuple[Callable[[], Geometry], float, float]] = {
@@ -81,6 +105,11 @@ SOLIDS: dict[str, tuple[Callable[[], Geometry], float, float]] = {
         0.5 * (24 - math.pi * 0.64),
         1e-3,
     ),
+    "doughnut": (_doughnut, 2 * math.pi**2 * 0.3**2, 5e-3),
+    "double pyramid": (_double_pyramid, _polygon(5), 1e-6),
+    "faceted": (lambda: faceted(_double_pyramid()), _polygon(5), 1e-6),
+    # Weyl 1939: a tube's volume is its section times the length of the curve through its middle.
+    "trefoil": (lambda: torus_knot((2, 3), (1, 0.4, 0.2), 400, 32), math.pi * 0.2**2 * _trefoil_length(), 0.01),
     "surface nets": (lambda: surface_nets(_sphere, (-0.6,) * 3, (0.6,) * 3, 0.05), 4 / 3 * math.pi * 0.125, 0.01),
 }
 
@@ -100,6 +129,30 @@ def test_normals_are_unit_and_on_the_side_of_the_winding(name: str) -> None:
     facing = np.einsum("tj,tcj->tc", face_normals(part.positions, part.indices), part.normals[part.indices])
     assert facing.min() > 0.3
     assert np.isfinite(part.uvs).all()
+
+
+@pytest.mark.parametrize(("build", "characteristic"), [(_doughnut, 0), (_double_pyramid, 2)])
+def test_seamless_solids_have_no_vertex_twice(build: Callable[[], Geometry], characteristic: int) -> None:
+    part = build()
+    assert len(np.unique(part.positions, axis=0)) == len(part.positions)
+    assert manifold(part.positions, part.indices)
+    assert len(part.positions) - part.triangle_count // 2 == characteristic  # Euler: V − E + T, with E = 3T/2
+
+
+def test_facets_have_the_normals_of_their_planes() -> None:
+    part = faceted(_double_pyramid())
+    assert len(part.positions) == 3 * part.triangle_count
+    assert manifold(part.positions, part.indices)
+    plane = face_normals(part.positions, part.indices)
+    np.testing.assert_allclose(part.normals[part.indices], np.repeat(plane[:, None], 3, axis=1), atol=1e-6)
+
+
+def test_manifold_finds_a_doubled_and_a_missing_triangle() -> None:
+    part = cuboid((0, 0, 0), (1, 1, 1))
+    assert manifold(part.positions, part.indices)
+    assert not manifold(part.positions, part.indices[1:])
+    assert not manifold(part.positions, np.concatenate([part.indices, part.indices[:1]]))
+    assert not manifold(part.positions, np.concatenate([part.indices, part.indices[:, ::-1]]))
 
 
 def test_open_edges_finds_a_missing_and_a_flipped_triangle() -> None:
