@@ -38,9 +38,9 @@ from tyndall.scene.model import Camera, Instance, Light, Material, PointLight, S
 TRIANGLES = 23_396
 
 WIDTH, HEIGHT, BACK, FRONT, WALL = 5.4, 2.6, -3.0, 2.6, 0.2
-BULB: Vec3 = (-2.0, 1.2, -0.75)
+BULB: Vec3 = (-2.1, 1.2, -0.5)
 BULB_RADIUS = 0.035
-INTENSITY = 60.0
+INTENSITY = 56.0
 TABLE_LOW, TABLE_HIGH = (-1.05, 0.70, 0.95), (1.05, 0.74, 2.15)  # of the table top
 
 
@@ -182,14 +182,14 @@ def interior(lights: int = 1, seed: int = 0) -> Scene:
 
     floor, walls, skirting = _room()
     knot = torus_knot((2, 3), (0.21, 0.09, 0.062), 192, 24).placed(
-        translation(-0.42, 0.37, -0.75) @ rotation("y", 0.35) @ rotation("x", -0.15)
+        translation(-0.5, 0.37, -1.3) @ rotation("y", 0.35) @ rotation("x", -0.15)
     )
-    carpet = rounded_box((-1.5, -0.012, -1.75), (1.5, 0.012, 0.6), 0.008)
+    carpet = rounded_box((-1.5, -0.012, -2.4), (1.5, 0.012, 0.2), 0.008)
     blocks = merge(
         [
-            rounded_box((-0.07, 0, -0.07), (0.07, 0.14, 0.07), 0.008, 2).at(0.76, 0.012, -0.35, 0.5),
-            rounded_box((-0.07, 0, -0.07), (0.07, 0.14, 0.07), 0.008, 2).at(0.98, 0.012, -0.5, 0.1),
-            rounded_box((-0.05, 0, -0.05), (0.05, 0.10, 0.05), 0.008, 2).at(0.85, 0.152, -0.42, 0.9),
+            rounded_box((-0.07, 0, -0.07), (0.07, 0.14, 0.07), 0.008, 2).at(0.66, 0.012, -0.75, 0.5),
+            rounded_box((-0.07, 0, -0.07), (0.07, 0.14, 0.07), 0.008, 2).at(0.88, 0.012, -0.9, 0.1),
+            rounded_box((-0.05, 0, -0.05), (0.05, 0.10, 0.05), 0.008, 2).at(0.75, 0.152, -0.82, 0.9),
         ]
     )
     parts: dict[str, tuple[Geometry, Material]] = {
@@ -201,16 +201,16 @@ def interior(lights: int = 1, seed: int = 0) -> Scene:
         "lampshade": (_shade(), plain("parchment", (0.72, 0.58, 0.40), 0.9, double_sided=True)),
         "lamp stand": (_stand(), Material("brass", (0.78, 0.58, 0.28, 1), 1.0, 0.35)),
         "knot": (knot, plain("red lacquer", (0.72, 0.12, 0.07), 0.35)),
-        "ribbon": (_ribbon().at(1.0, 0.012, -1.4, -0.2), plain("ribbon", (0.80, 0.74, 0.62), 0.7)),
-        "rings": (_tower().at(0.2, 0.012, -1.75), plain("yellow", (0.82, 0.55, 0.10), 0.4)),
-        "ball": (ball(0.16, 32, 20).at(0.12, 0.172, -0.45), plain("blue", (0.10, 0.24, 0.48), 0.4)),
-        "arch": (_arch(0.13, 0.22, 0.09).at(-0.62, 0.012, -0.1, 0.5), plain("green", (0.20, 0.36, 0.18), 0.5)),
+        "ribbon": (_ribbon().at(0.82, 0.012, -1.75, -0.15), plain("ribbon", (0.80, 0.74, 0.62), 0.7)),
+        "rings": (_tower().at(0.1, 0.012, -2.05), plain("yellow", (0.82, 0.55, 0.10), 0.4)),
+        "ball": (ball(0.16, 32, 20).at(0.05, 0.172, -0.85), plain("blue", (0.10, 0.24, 0.48), 0.4)),
+        "arch": (_arch(0.13, 0.22, 0.09).at(-0.72, 0.012, -0.55, 0.45), plain("green", (0.20, 0.36, 0.18), 0.5)),
         "blocks": (blocks, plain("beech", (0.66, 0.48, 0.30), 0.6)),
     }
     return Scene(
         instances=tuple(Instance(part.mesh(material, name), name=name) for name, (part, material) in parts.items()),
         lights=_lights(options.lights),
-        camera=Camera((0.55, 0.56, 1.8), (-0.22, 0.14, -0.9), fov=math.radians(44), exposure=0.6),
-        ambient=(0.12, 0.13, 0.16),
+        camera=Camera((0.8, 0.56, 1.5), (-0.21, 0.25, -0.78), fov=math.radians(41), exposure=0.6),
+        ambient=(0.14, 0.14, 0.16),
         name="interior",
     )
