@@ -224,7 +224,7 @@ def test_a_scene_may_be_asked_for_any_number_of_triangles(capsys: pytest.Capture
     document = run_json(capsys, "render", "shadows:137", *words)
     assert (document["triangles"], document["image"]) == (137, "out/shadows-137/off.png")
     code, _, err = run(capsys, "render", "shadows:7", *words)
-    assert (code, err) == (2, "triangles: 7 is outside 10 … 10000000\n")
+    assert (code, err) == (2, "tyndall: triangles: 7 is outside 10 … 10000000\n")
 
 
 def test_bench_writes_its_figures_as_json_and_as_tables(
