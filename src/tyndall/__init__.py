@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     from tyndall.scene.stage import stage
     from tyndall.techniques.antialiasing import NoAntialiasing, Taa
     from tyndall.techniques.occlusion import NoOcclusion, RayTracedAo
-    from tyndall.techniques.shadow import RayTraced, ShadowMap
+    from tyndall.techniques.shadow import RayTraced, ShadowMap, ShadowVolume
     from tyndall.techniques.tonemap import Aces, Agx, Clip
     from tyndall.techniques.volumetric import Froxel, March, Off, Polygonal, ScreenSpace
 
@@ -88,6 +88,7 @@ __all__ = [
     "Schlick",
     "ScreenSpace",
     "ShadowMap",
+    "ShadowVolume",
     "SpotLight",
     "Sweep",
     "SweepError",

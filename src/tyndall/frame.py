@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tyndall.content.mesh import DEPTH_FORMAT, GBUFFER_TARGETS, Meshes
+from tyndall.content.mesh import GBUFFER_TARGETS, Meshes
 from tyndall.gpu.device import Gpu, GpuError
 from tyndall.gpu.params import ParameterError
 from tyndall.gpu.resources import Closing, Resource, Texture
@@ -53,15 +53,14 @@ _IMAGES = {
     "normal_roughness": GBUFFER_TARGETS[0][0],
     "albedo_metallic": GBUFFER_TARGETS[1][0],
     "emissive": GBUFFER_TARGETS[2][0],
-    "velocity": GBUFFER_TARGETS[3][0],
-    "depth": DEPTH_FORMAT,
+    "depth": "",  # Gpu.depth_format
     "base": "rgba16float",
     "inscatter": "rgba32float",
     "transmittance_map": "rgba16float",
     "lit": "rgba16float",
     "picture": "rgba8unorm",
 }
-_TARGETS = ("normal_roughness", "albedo_metallic", "emissive", "velocity")
+_TARGETS = ("normal_roughness", "albedo_metallic", "emissive")
 
 
 class Renderer(Closing):
@@ -135,17 +134,22 @@ class Renderer(Closing):
         gpu, size = self.gpu, self.size
         if max(size) > (limit := gpu.limits["max-texture-dimension-2d"]):
             raise GpuError(f"size: {size[0]}×{size[1]} is beyond this adapter's limit of {limit} pixels a side")
-        for name, format in _IMAGES.items():
-            drawn = name in _TARGETS or name in ("depth", "inscatter")
-            stored = name not in (*_TARGETS, "depth")
-            usage = " ".join(["sampled", *(["target"] if drawn else []), *(["storage"] if stored else [])])
-            self._images[name] = gpu.texture(f"frame.{name}", size, format, owner=OWNER, usage=usage)
-            self._resources.append(self._images[name])
-        self._resolved = self._images["lit"]
         black = gpu.texture("frame.black", (1, 1), "rgba32float", owner=OWNER, usage="sampled")
         self._resources.append(black)
         gpu.write_texture(black, np.zeros((1, 1, 4), np.float32))
         self._content = [Meshes(gpu, self.scene)]
+        self._targets = _TARGETS if any(content.emits for content in self._content) else _TARGETS[:2]
+        for name, format in _IMAGES.items():
+            if name in _TARGETS and name not in self._targets:
+                self._images[name] = black  # nothing shines by itself: a load outside of it is 0 as well
+                continue
+            drawn = name in _TARGETS or name in ("depth", "inscatter")
+            stored = name not in (*_TARGETS, "depth")
+            usage = " ".join(["sampled", *(["target"] if drawn else []), *(["storage"] if stored else [])])
+            image = gpu.texture(f"frame.{name}", size, format or gpu.depth_format, owner=OWNER, usage=usage)
+            self._images[name] = image
+            self._resources.append(image)
+        self._resolved = self._images["lit"]
         self._camera = self._buffer("camera", gpu.dtype(_CAMERA).itemsize, _CAMERA, "uniform")
         self._medium = self._buffer("medium", gpu.dtype(_MEDIUM).itemsize, _MEDIUM, "uniform")
         count = max(1, len(self.scene.lights))
@@ -240,10 +244,12 @@ class Renderer(Closing):
         self._update(camera, jitter)
         scope = self._scope
 
-        targets = [(images[name].view(), (0.0, 0.0, 0.0, 0.0)) for name in _TARGETS]
-        with gpu.render("gbuffer.mesh", targets, (images["depth"].view(), 0.0)) as native:
+        targets = [(images[name].view(), (0.0, 0.0, 0.0, 0.0)) for name in self._targets]
+        # Its stencil, where it has one, is cleared with it: drivers pack the two, and clear both at once or neither.
+        clear = 0 if images["depth"].has_stencil else None
+        with gpu.render("gbuffer.mesh", targets, (images["depth"].view(), 0.0), stencil=clear) as native:
             for content in self._content:
-                content.draw_gbuffer(native, scope)
+                content.draw_gbuffer(native, scope, emissive="emissive" in self._targets)
 
         shadow = self._view("shadow")
         shadow.maps_wanted = self.technique("volumetric").reads_maps
@@ -343,7 +349,12 @@ class Renderer(Closing):
 
     def depth(self) -> NDArray[np.float32]:
         """(height, width) float32: metres along the view axis, infinite for the background."""
-        raw = self.gpu.read_texture(self._images["depth"])[..., 0].astype(np.float32)
+        gpu = self.gpu
+        # A depth beside a stencil cannot be copied to the host as it is.
+        with gpu.texture("frame.depth_copy", self.size, "r32float", owner=OWNER) as plain:
+            gpu.compute("depth", _MODULE, "copy_depth").bind(self._scope, depth_out=plain.write()).dispatch(*self.size)
+            raw = gpu.read_texture(plain)[..., 0].astype(np.float32)
+        gpu.forget_groups()
         with np.errstate(divide="ignore"):
             return np.float32(self._camera_seen.near if self._camera_seen else 1) / raw
 

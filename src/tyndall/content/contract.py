@@ -21,10 +21,16 @@ Casters = Literal["all", "beside_outline"]
 
 
 class Content(Protocol):
-    """One kind of scene content on the device."""
+    """One kind of scene content on the device.
 
-    def draw_gbuffer(self, native_pass: Any, scope: Mapping[str, Bound]) -> None:
-        """Draw into the G-buffer; ``scope`` binds ``camera``."""
+    Attributes:
+        emits: whether something of it shines by itself.
+    """
+
+    emits: bool
+
+    def draw_gbuffer(self, native_pass: Any, scope: Mapping[str, Bound], *, emissive: bool) -> None:
+        """Draw into the G-buffer; ``scope`` binds ``camera``. It has an emissive target only if some content emits."""
 
     def draw_depth(self, native_pass: Any, scope: Mapping[str, Bound], cull: Cull, casters: Casters = "all") -> None:
         """Draw depth as a light sees it; ``scope`` binds ``shadow_layers`` and ``layer``.

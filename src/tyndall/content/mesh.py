@@ -30,18 +30,16 @@ GBUFFER_TARGETS: tuple[tuple[str, Blend | None], ...] = (
     ("rgba16float", None),
     ("rgba8unorm-srgb", None),
     ("rgba16float", None),
-    ("rg16float", None),
 )
-DEPTH_FORMAT = "depth32float"
+MAP_FORMAT = "depth32float"
 
 _POSITION = (12, ((0, "float32x3", 0),))
 _ATTRIBUTES = (16, ((1, "snorm16x4", 0), (2, "float32x2", 8)))
 MAPS = ("base_color", "metallic_roughness", "normal", "emissive")
 _ADDRESS = {"repeat": "repeat", "clamp": "clamp-to-edge", "mirror": "mirror-repeat"}
 
-_GBUFFER = Raster(targets=GBUFFER_TARGETS, depth=DEPTH_FORMAT, vertex_buffers=(_POSITION, _ATTRIBUTES))
-_MASKED_DEPTH = Raster(depth=DEPTH_FORMAT, vertex_buffers=(_POSITION, _ATTRIBUTES))
-_SOLID_DEPTH = Raster(depth=DEPTH_FORMAT, vertex_buffers=(_POSITION,))
+_MASKED_DEPTH = Raster(depth=MAP_FORMAT, vertex_buffers=(_POSITION, _ATTRIBUTES))
+_SOLID_DEPTH = Raster(depth=MAP_FORMAT, vertex_buffers=(_POSITION,))
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +77,7 @@ class Meshes:
         placed: by a mesh's ``id``, its first index and first vertex in the streams.
         material_of: by a mesh's ``id``, its material's row.
         material_list: the materials in the order of their rows.
+        emits: whether a material does, so that the G-buffer has a target for it.
     """
 
     def __init__(self, gpu: Gpu, scene: Scene) -> None:
@@ -116,6 +115,7 @@ class Meshes:
             materials.setdefault(id(mesh.material), mesh.material)
         material_index = {key: i for i, key in enumerate(materials)}
         self.material_list = list(materials.values())
+        self.emits = any(any(material.emissive) for material in self.material_list)
         self.material_of = {key: material_index[id(mesh.material)] for key, mesh in meshes.items()}
 
         vertex_total = sum(len(m.positions) for m in meshes.values())
@@ -194,9 +194,9 @@ class Meshes:
 
     # --- drawing --------------------------------------------------------------------------------------------------
 
-    def draw_gbuffer(self, native_pass: Any, scope: Mapping[str, Bound]) -> None:
+    def draw_gbuffer(self, native_pass: Any, scope: Mapping[str, Bound], *, emissive: bool) -> None:
         """Draw into the G-buffer; ``scope`` binds ``camera``."""
-        self._replay(native_pass, "gbuffer", scope, "back")
+        self._replay(native_pass, "emissive gbuffer" if emissive else "gbuffer", scope, "back")
 
     def draw_depth(self, native_pass: Any, scope: Mapping[str, Bound], cull: Cull, casters: Casters = "all") -> None:
         """Draw depth from a light; ``scope`` binds ``shadow_layers`` and ``layer``.
@@ -226,7 +226,7 @@ class Meshes:
         draws = [draw for draw in self._draws if casters == "all" or draw.is_masked]
         if not draws:
             return
-        names = ("camera",) if kind == "gbuffer" else ("shadow_layers", "layer")
+        names = ("shadow_layers", "layer") if kind == "depth" else ("camera",)
         bound = {name: scope[name] for name in names}
         key = (kind, cull, casters, tuple(b.key for b in bound.values()))
         if key not in self._bundles:
@@ -235,7 +235,10 @@ class Meshes:
 
     def _record(self, kind: str, scope: Mapping[str, Any], cull: str, draws: list[_Draw]) -> Any:
         gpu = self._gpu
-        base = _GBUFFER if kind == "gbuffer" else _SOLID_DEPTH
+        emissive = kind == "emissive gbuffer"
+        targets = GBUFFER_TARGETS if emissive else GBUFFER_TARGETS[:2]
+        seen = Raster(targets=targets, depth=gpu.depth_format, vertex_buffers=(_POSITION, _ATTRIBUTES))
+        base = _SOLID_DEPTH if kind == "depth" else seen
         bundle = gpu.bundle(f"mesh.{kind}", base)
         bundle.set_index_buffer(self.indices.native, "uint32")
         bundle.set_vertex_buffer(0, self.positions.native)
@@ -252,8 +255,8 @@ class Meshes:
                 "materials": self.materials,
                 **self._maps[id(draw.material)],
             }
-            if kind == "gbuffer":
-                state, vertex, fragment = _GBUFFER, "vertex", "fragment"
+            if kind != "depth":
+                state, vertex, fragment = seen, "vertex", "fragment"
             elif masked:
                 state, vertex, fragment = _MASKED_DEPTH, "depth_vertex", "depth_fragment"
             else:
@@ -264,7 +267,7 @@ class Meshes:
                 bindings,
                 vertex=vertex,
                 fragment=fragment,
-                features=_features(draw.material),
+                features={**_features(draw.material), "scene_emits": emissive},
             )
             if pipeline is not current:
                 bundle.set_pipeline(pipeline)
@@ -319,9 +322,12 @@ def _centred(mesh: Mesh) -> NDArray[np.float32]:
 
 def _features(material: Material) -> dict[str, bool]:
     """What a material's shader must do: a fragment of a plain one is several times as cheap."""
+    maps = {f"has_{name}": getattr(material, f"{name}_texture") is not None for name in MAPS}
     return {
-        **{f"has_{name}": getattr(material, f"{name}_texture") is not None for name in MAPS},
+        **maps,
+        "is_textured": any(maps.values()),
         "is_masked": material.alpha_mode == "mask",
+        "is_two_sided": material.double_sided,
     }
 
 

@@ -246,6 +246,11 @@ class Gpu(Closing):
             self._period = _timestamp_period(self.device)
         self._submitted_labels: list[str] = []
 
+    @property
+    def depth_format(self) -> str:
+        """Of the picture's depth: with a stencil beside it where the adapter has that."""
+        return "depth32float-stencil8" if "depth32float-stencil8" in self.features else "depth32float"
+
     # --- resources ------------------------------------------------------------------------------------------------
 
     def texture(
@@ -512,12 +517,11 @@ class Gpu(Closing):
                     "depth_clear_value": clear_depth or 0.0,
                 }
             )
-            if stencil is not None:
-                descriptor["depth_stencil_attachment"] |= {
-                    "stencil_load_op": "clear",
-                    "stencil_store_op": "store",
-                    "stencil_clear_value": stencil,
-                }
+            descriptor["depth_stencil_attachment"] |= (
+                {"stencil_read_only": True}
+                if stencil is None
+                else {"stencil_load_op": "clear", "stencil_store_op": "store", "stencil_clear_value": stencil}
+            )
         encoder = self.encoder
         if (stamps := self.timestamps(label)) is not None:
             descriptor["timestamp_writes"] = stamps

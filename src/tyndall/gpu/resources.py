@@ -308,7 +308,7 @@ class Texture(Resource):
         if "sampled" not in self._bounds:
             suffix = self.dimension.replace("-", "_")
             depth = self.format.startswith("depth")
-            view = self._aspect("depth-only") if self.format.endswith("stencil8") else self.view()
+            view = self._aspect("depth-only") if self.has_stencil else self.view()
             scalar = "u32" if self.format.endswith("uint") else "f32"
             wesl = f"texture_depth_{suffix}" if depth else f"texture_{suffix}<{scalar}>"
             kind = "depth" if depth else "uint" if scalar == "u32" else "float"
@@ -317,6 +317,11 @@ class Texture(Resource):
             layout = (("texture", (("sample_type", kind), ("view_dimension", self.dimension))),)
             self._bounds["sampled"] = Bound(Slot(f"var {{name}}: {wesl};", layout, _ALL), view)
         return self._bounds["sampled"]
+
+    @property
+    def has_stencil(self) -> bool:
+        """Whether its format has stencil values."""
+        return self.format.endswith("stencil8")
 
     def stencil(self) -> Bound:
         """The stencil values as ``texture_2d<u32>``."""

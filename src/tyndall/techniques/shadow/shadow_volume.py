@@ -24,7 +24,7 @@ shadow maps. Lights with a size cast the hard shadow of their centre.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Literal
 
@@ -33,13 +33,12 @@ from tyndall.gpu.device import Raster, Stencil
 from tyndall.gpu.params import param
 from tyndall.gpu.resources import Texture
 from tyndall.scene.model import DirectionalLight
-from tyndall.techniques.contract import Technique, View, Visibility
+from tyndall.techniques.contract import Technique, Unsupported, View, Visibility
 from tyndall.techniques.shadow.masks import answered_by_masks, mask_image
 from tyndall.techniques.shadow.shadow_map import ShadowMap
 from tyndall.techniques.shadow.silhouettes import Silhouette, silhouettes
 
 MODULE = "package::techniques::shadow::shadow_volume"
-DEPTH = "depth32float-stencil8"
 _COUNT = {
     "zpass": Stencil(front_pass="increment-wrap", back_pass="decrement-wrap"),
     "zfail": Stencil(front_fail="decrement-wrap", back_fail="increment-wrap"),
@@ -88,45 +87,33 @@ class Counter:
         if any(kind.casts_beside_outline() for kind in content):
             self.beside = dict(maps.render(view.part(maps, "beside"), content, "beside_outline").bindings)
 
-    def each(self) -> Any:
+    def each(self) -> Iterator[tuple[int, Texture]]:
         """(light, texture whose stencil values are the counts) for each light in turn."""
         for light, stencil, _ in self.each_with_silhouettes():
             yield light, stencil
 
-    def each_with_silhouettes(self) -> Any:
+    def each_with_silhouettes(self) -> Iterator[tuple[int, Texture, list[Silhouette]]]:
         """The same, and the light's silhouettes."""
         view, gpu = self._view, self._view.gpu
-        counts = view.texture("counts", view.size, DEPTH, usage="sampled target")
+        depth = view.images["depth"]
+        if not depth.has_stencil:
+            raise Unsupported(
+                f"{view.technique.name}: this adapter has no stencil beside a 32-bit depth; use shadow_map"
+            )
         caps = self._method == "zfail"
-        if not self._outlines:
-            with gpu.render(f"{view.owner}.volumes", depth=(counts.view(), 0.0), stencil=0):
-                pass
-            for light in range(len(view.scene.lights)):
-                yield light, counts, []
-            return
-        self._copy_depth(counts)
-        for found in silhouettes(view, self._outlines, caps=caps):
-            light = found[0].light
+        lights = range(len(view.scene.lights))
+        found = silhouettes(view, self._outlines, caps=caps) if self._outlines else iter([[]] * len(lights))
+        for light, outlines in zip(lights, found, strict=True):
             with gpu.render(
-                f"{view.owner}.volumes", depth=(counts.view(), None), depth_read_only=True, stencil=0
+                f"{view.owner}.volumes", depth=(depth.view(), None), depth_read_only=True, stencil=0
             ) as native:
-                for silhouette in found:
+                for silhouette in outlines:
                     self._draw(native, silhouette, caps)
-            yield light, counts, found
-
-    def _copy_depth(self, counts: Texture) -> None:
-        """The picture's depth, into a buffer that has a stencil beside it."""
-        view, gpu = self._view, self._view.gpu
-        state = Raster(depth=DEPTH, depth_compare="always")
-        pipeline, group = gpu.raster(MODULE, state, view.scope, vertex="whole_picture", fragment="copied_depth")
-        with gpu.render(f"{view.owner}.depth", depth=(counts.view(), 0.0), stencil=0) as native:
-            native.set_pipeline(pipeline)
-            native.set_bind_group(0, group)
-            native.draw(3)
+            yield light, depth, outlines
 
     def _draw(self, native: Any, silhouette: Silhouette, caps: bool) -> None:
         view, gpu = self._view, self._view.gpu
-        state = Raster(depth=DEPTH, depth_write=False, stencil=_COUNT[self._method])
+        state = Raster(depth=gpu.depth_format, depth_write=False, stencil=_COUNT[self._method])
         scope = {
             **view.scope,
             **silhouette.outline.bindings,

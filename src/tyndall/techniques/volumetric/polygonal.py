@@ -42,8 +42,6 @@ from tyndall.techniques.shadow.shadow_map import first_layers, layer_count
 from tyndall.techniques.volumetric.paper import refuse_near_lights
 
 _STATE = Raster(targets=(("rgba32float", ADD),), topology="triangle-strip")
-# The mesh lies on the lit surfaces, where G = 0: pushed back a little, those faces fail the depth test.
-_TESTED = replace(_STATE, depth="depth32float", depth_write=False, depth_bias=-64)
 
 
 @dataclass(frozen=True)
@@ -105,7 +103,9 @@ class Polygonal(Technique):
         with gpu.render(f"{view.owner}.faces", target, depth, depth_read_only=True) as native:
             for index, layer in drawn:
                 bindings["light_index"], bindings["layer"] = gpu.constant(index), gpu.constant(layer)
-                state = _TESTED if physical else _STATE
+                # The mesh lies on the lit surfaces, where G = 0: pushed back a little, those faces fail the depth test.
+                tested = replace(_STATE, depth=view.gpu.depth_format, depth_write=False, depth_bias=-64)
+                state = tested if physical else _STATE
                 pipeline, group = gpu.raster(self.shader(), state, bindings, overlay=view.overlay)
                 native.set_pipeline(pipeline)
                 native.set_bind_group(0, group)
