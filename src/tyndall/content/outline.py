@@ -143,6 +143,7 @@ class Outline:
         triangles, edges: how many there are, counted once for each placement.
         most_records: upper bound of the pieces that an outline may have; an edge of an open part may count twice.
         parts: how many placements.
+        closed: whether all parts of all meshes are.
     """
 
     def __init__(
@@ -172,6 +173,7 @@ class Outline:
             self.most_records += len(adjacency.edges) * (1 if adjacency.closed.all() else 2)
         rows[-1]["first_triangle"], rows[-1]["first_edge"] = self.triangles, self.edges
         self.parts = len(placed)
+        self.closed = all(adjacency.closed.all() for adjacency in found.values())
         edges = np.concatenate([a.edges for a in found.values()])
         bits = np.packbits(closed.reshape(-1, 32), axis=1, bitorder="little").view("<u4").ravel()
         positions, indices, instances = streams

@@ -36,7 +36,7 @@ from tyndall.scene.model import DirectionalLight
 from tyndall.techniques.contract import Technique, Unsupported, View, Visibility
 from tyndall.techniques.shadow.masks import answered_by_masks, mask_image
 from tyndall.techniques.shadow.shadow_map import ShadowMap
-from tyndall.techniques.shadow.silhouettes import Silhouette, silhouettes
+from tyndall.techniques.shadow.silhouettes import Sheet, Silhouette, silhouettes
 
 MODULE = "package::techniques::shadow::shadow_volume"
 _COUNT = {
@@ -77,12 +77,13 @@ class Counter:
     """Counts volumes; for techniques that start from the hard shadow.
 
     Attributes:
+        outlines: of what casts by them.
         beside: what the module of :class:`ShadowMap` needs, for what casts beside all outlines; empty without such.
     """
 
     def __init__(self, view: View, method: str, maps: ShadowMap, content: Sequence[Content]) -> None:
         self._view, self._method = view, method
-        self._outlines = [outline for kind in content if (outline := kind.outline()) is not None]
+        self.outlines = [outline for kind in content if (outline := kind.outline()) is not None]
         self.beside: dict[str, Any] = {}
         if any(kind.casts_beside_outline() for kind in content):
             self.beside = dict(maps.render(view.part(maps, "beside"), content, "beside_outline").bindings)
@@ -92,7 +93,7 @@ class Counter:
         for light, stencil, _ in self.each_with_silhouettes():
             yield light, stencil
 
-    def each_with_silhouettes(self) -> Iterator[tuple[int, Texture, list[Silhouette]]]:
+    def each_with_silhouettes(self, *, segments: bool = False, sheet: Sheet = "both") -> Iterator[tuple[int, Texture, list[Silhouette]]]:
         """The same, and the light's silhouettes."""
         view, gpu = self._view, self._view.gpu
         depth = view.images["depth"]
@@ -102,7 +103,11 @@ class Counter:
             )
         caps = self._method == "zfail"
         lights = range(len(view.scene.lights))
-        found = silhouettes(view, self._outlines, caps=caps) if self._outlines else iter([[]] * len(lights))
+        found = (
+            silhouettes(view, self.outlines, caps=caps, segments=segments, sheet=sheet)
+            if self.outlines
+            else iter([[]] * len(lights))
+        )
         for light, outlines in zip(lights, found, strict=True):
             with gpu.render(
                 f"{view.owner}.volumes", depth=(depth.view(), None), depth_read_only=True, stencil=0
