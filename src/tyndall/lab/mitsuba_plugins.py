@@ -1,9 +1,10 @@
 """Mitsuba plugins for what Tyndall's scenes have and Mitsuba does not; its just-in-time variants compile them, too.
 
 - ``tyndall_reflection``: the reflection model of wesl/brdf.wesl with the textures of content/mesh.wesl, and holes;
-- ``tyndall_lamp``: glTF's spot falloff, lights with a size (a radius, an angular diameter, or a rectangle) that nobody
-  sees and that cast no shadow, and directional lights whose illuminance is that which arrives in the medium. Mitsuba dims those on their way
-  through the medium, so the lamp is brighter by e^(σt·s), s the length of that way in the medium;
+- ``tyndall_lamp``: glTF's spot falloff; lights with a size (a radius, an angular diameter, or a rectangle) that nobody
+  sees and that cast no shadow; and directional lights whose illuminance is that which arrives in the medium. Mitsuba
+  dims those on their way through the medium, so the lamp is brighter by e^(σt·s), s the length of that way in the
+  medium;
 - ``tyndall_glow``: emissive surfaces with their texture, seen from both sides;
 - ``tyndall_phase``: Gibbons' and Schlick's phase functions.
 """

@@ -2,8 +2,8 @@
 
 The scene's depth is drawn from each light; a point is in shadow where something nearer was drawn:
 ``V(p) = 1 if z(p) ≥ depth(p) else 0`` in reversed-Z. Directional lights use an orthographic map fitted to the scene's
-box, spot lights a perspective one, point and rectangular lights a cube of six around their centre. All maps are layers of
-one depth texture.
+box, spot lights a perspective one, point and rectangular lights a cube of six around their centre. All maps are layers
+of one depth texture.
 
 A surface's own texel would shade it in places ("acne"). Three remedies, each in texels of the map so that they hold
 at any resolution and scale: a constant bias and one that grows with the slope, both towards the light, and an offset
