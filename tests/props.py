@@ -27,6 +27,7 @@ from tyndall.scene.model import (
     Mesh,
     Phase,
     Rayleigh,
+    RectLight,
     Scene,
     Schlick,
     SpotLight,
@@ -287,7 +288,8 @@ def lit_slab(scene: Scene, size: tuple[int, int], begin: ArrayLike, end: ArrayLi
 
 
 def quadrature(scene: Scene, light: Light, size: tuple[int, int], begin: ArrayLike, end: ArrayLike) -> Floats:
-    """Unshadowed single scattering (H, W, 3) of a point or spot light between two distances, by Gauss–Legendre.
+    """Unshadowed single scattering (H, W, 3) of a near light between two distances, by Gauss–Legendre; a rectangle's as
+    from its mean direction.
 
     The medium must hold both the camera and the light.
     """
@@ -299,6 +301,8 @@ def quadrature(scene: Scene, light: Light, size: tuple[int, int], begin: ArrayLi
     for node, weight in zip(nodes, weights, strict=True):
         s = begin + (end - begin) * (node + 1) / 2
         irradiance, travels = arriving(light, sigma, seen.at(s))
+        if isinstance(light, RectLight):
+            irradiance = irradiance * fluence_ratio(light, seen.at(s))[..., None]
         p = phase(medium.phase, -(travels * seen.directions).sum(-1))
         total += (weight / 2 * (end - begin) * p)[..., None] * irradiance * np.exp(-sigma * s[..., None])
     return np.array(medium.scattering) * total
@@ -312,6 +316,12 @@ def arriving(light: Light, sigma: ArrayLike, points: Floats) -> tuple[Floats, Fl
         return np.broadcast_to(colour, points.shape), np.broadcast_to(travels, points.shape)
     way = points - np.array(light.position)
     r = np.linalg.norm(way, axis=-1, keepdims=True)
+    if isinstance(light, RectLight):
+        vector = vector_irradiance(light, points)
+        size = np.linalg.norm(vector, axis=-1, keepdims=True)
+        return size * colour * np.exp(-np.asarray(sigma) * r), np.where(
+            size > 0, -vector / np.maximum(size, 1e-30), way / r
+        )
     irradiance = colour / r**2 * np.exp(-np.asarray(sigma) * r)
     if isinstance(light, SpotLight):
         # The formula of KHR_lights_punctual.
@@ -320,6 +330,42 @@ def arriving(light: Light, sigma: ArrayLike, points: Floats) -> tuple[Floats, Fl
         offset = -math.cos(light.outer_angle) * scale
         irradiance = irradiance * np.clip((way / r) @ axis * scale + offset, 0, 1)[..., None] ** 2
     return irradiance, way / r
+
+
+def _corners(light: RectLight, points: Floats) -> tuple[list[Floats], Floats]:
+    """The ways (…, 3) from points to a rectangle's corners, and whether the points are before it."""
+    across, along = light.axes
+    way = np.array(light.position) - points
+    ways = [way + u * across + v * along for u, v in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+    return ways, (way @ np.array(light.direction) < 0).astype(float)
+
+
+def vector_irradiance(light: RectLight, points: Floats) -> Floats:
+    """Lambert's sum over the sides of a rectangle of 1 cd, (…, 3) towards it: the angle that each fills by its plane's
+    normal; 0 behind it.
+    """
+    ways, before = _corners(light, points)
+    units = [way / np.linalg.norm(way, axis=-1, keepdims=True) for way in ways]
+    total = np.zeros(points.shape)
+    for a, b in zip(units, [*units[1:], units[0]], strict=True):
+        normal = np.cross(a, b)
+        sine = np.linalg.norm(normal, axis=-1)
+        total += (np.arctan2(sine, (a * b).sum(-1)) / np.maximum(sine, 1e-30))[..., None] * normal
+    return 0.5 / (light.width * light.height) * total * before[..., None]
+
+
+def fluence_ratio(light: RectLight, points: Floats) -> Floats:
+    """The solid angle (…) that a rectangle fills over the irradiance that its radiance gives a surface facing it."""
+    (a, b, c, d), before = _corners(light, points)
+    angle = np.zeros(points.shape[:-1])
+    for p, q, r in ((a, b, c), (a, c, d)):  # Van Oosterom and Strackee 1983
+        lengths = [np.linalg.norm(x, axis=-1) for x in (p, q, r)]
+        below = np.prod(lengths, axis=0)
+        for x, y, z in ((p, q, 2), (q, r, 0), (r, p, 1)):
+            below = below + (x * y).sum(-1) * lengths[z]
+        angle += 2 * np.arctan2(np.abs((p * np.cross(q, r)).sum(-1)), below)
+    size = np.linalg.norm(vector_irradiance(light, points), axis=-1) * light.width * light.height
+    return np.where(before > 0, angle / np.maximum(size, 1e-30), 1.0)
 
 
 def reflected(

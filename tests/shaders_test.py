@@ -19,6 +19,7 @@ from tyndall.scene.model import (
     Material,
     Medium,
     PointLight,
+    RectLight,
     Scene,
     SpotLight,
     Texture,
@@ -40,6 +41,7 @@ LIGHTS = [
     DirectionalLight((0.2, -1, 0.4)),
     PointLight((0, 1, -2), radius=0.1),
     SpotLight((1, 2, -2), (-0.2, -1, -0.2)),
+    RectLight((-1, 2, -2), (0.2, -1, -0.2), width=0.5),
 ]
 
 

@@ -29,7 +29,7 @@ from tyndall.scene.model import (
     DirectionalLight,
     HenyeyGreenstein,
     Medium,
-    PointLight,
+    RectLight,
     Scene,
     Schlick,
     SpotLight,
@@ -46,7 +46,7 @@ _LIGHT = "package::wesl::light::Light"
 _MEDIUM = "package::wesl::medium::Medium"
 _MODULE = "package::frame"
 _PHASES = ("isotropic", "henyey_greenstein", "rayleigh", "gibbons", "schlick")  # as wesl/phase.wesl numbers them
-_KINDS = ("directional", "point", "spot")  # as wesl/light.wesl numbers them
+_KINDS = ("directional", "point", "spot", "rect")  # as wesl/light.wesl numbers them
 _UNBOUNDED = 1e10
 
 _IMAGES = {
@@ -504,11 +504,13 @@ def pack_lights(scene: Scene, dtype: np.dtype[Any]) -> NDArray[Any]:
         row["kind"] = _KINDS.index(light.kind)
         row["intensity"] = np.multiply(light.color, light.intensity)
         row["first_layer"] = first
-        if isinstance(light, (PointLight, SpotLight)):
+        if not isinstance(light, DirectionalLight):
             row["position"] = light.position
-        if isinstance(light, (DirectionalLight, SpotLight)):
+        if isinstance(light, (DirectionalLight, SpotLight, RectLight)):
             row["direction"] = np.asarray(light.direction) / np.linalg.norm(light.direction)
         row["radius"] = light.extent
         if isinstance(light, SpotLight):
             row["cone_scale"], row["cone_offset"] = light.cone
+        if isinstance(light, RectLight):
+            row["across"], row["along"] = light.axes
     return rows

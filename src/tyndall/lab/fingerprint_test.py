@@ -18,6 +18,7 @@ from tyndall.scene.model import (
     Material,
     Medium,
     Mesh,
+    RectLight,
     Scene,
     Texture,
 )
@@ -61,6 +62,7 @@ turned = ((0, 0, 1, 0), (0, 1, 0, 0), (-1, 0, 0, 0), (0, 0, 0, 1))
         {"instances": (Instance(triangle()), Instance(triangle()))},
         {"instances": (Instance(triangle(material=textured)),)},
         {"lights": (DirectionalLight(intensity=3.0000001),)},
+        {"lights": (RectLight(intensity=3.0),)},
         {"camera": Camera(exposure=1.0)},
         {"medium": Medium(scattering=(0.1, 0.1, 0.1), phase=HenyeyGreenstein(0.2))},
         {"medium": Medium(absorption=(0.1, 0.1, 0.1))},

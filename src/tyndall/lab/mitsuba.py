@@ -47,7 +47,17 @@ from tyndall.frame import view_matrix
 from tyndall.gpu.params import ParameterError
 from tyndall.lab.mitsuba_run import write_ply
 from tyndall.lab.truth import Truth, TruthSettings
-from tyndall.scene.model import DirectionalLight, HenyeyGreenstein, Light, Material, Medium, Scene, Schlick, SpotLight
+from tyndall.scene.model import (
+    DirectionalLight,
+    HenyeyGreenstein,
+    Light,
+    Material,
+    Medium,
+    RectLight,
+    Scene,
+    Schlick,
+    SpotLight,
+)
 
 log = logging.getLogger("tyndall")
 
@@ -464,11 +474,13 @@ def _light(light: Light) -> dict[str, Any]:
     }
     if not isinstance(light, DirectionalLight):
         found["position"] = light.position
-    if isinstance(light, (DirectionalLight, SpotLight)):
+    if isinstance(light, (DirectionalLight, SpotLight, RectLight)):
         direction = np.asarray(light.direction, np.float64)
         found["direction"] = (direction / np.linalg.norm(direction)).tolist()
     if isinstance(light, SpotLight):
         found["cone_scale"], found["cone_offset"] = light.cone
+    if isinstance(light, RectLight):
+        found["across"], found["along"] = (axis.tolist() for axis in light.axes)
     return found
 
 

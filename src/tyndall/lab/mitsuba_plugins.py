@@ -1,9 +1,10 @@
 """Mitsuba plugins for what Tyndall's scenes have and Mitsuba does not; its just-in-time variants compile them, too.
 
 - ``tyndall_reflection``: the reflection model of wesl/brdf.wesl with the textures of content/mesh.wesl, and holes;
-- ``tyndall_lamp``: glTF's spot falloff, lights with a radius or an angular diameter that nobody sees and that cast no
-  shadow, and directional lights whose illuminance is that which arrives in the medium. Mitsuba dims those on their way
-  through the medium, so the lamp is brighter by e^(σt·s), s the length of that way in the medium;
+- ``tyndall_lamp``: glTF's spot falloff; lights with a size (a radius, an angular diameter, or a rectangle) that nobody
+  sees and that cast no shadow; and directional lights whose illuminance is that which arrives in the medium. Mitsuba
+  dims those on their way through the medium, so the lamp is brighter by e^(σt·s), s the length of that way in the
+  medium;
 - ``tyndall_glow``: emissive surfaces with their texture, seen from both sides;
 - ``tyndall_phase``: Gibbons' and Schlick's phase functions.
 """
@@ -350,6 +351,14 @@ def _lamp(mi: Any, dr: Any, content: dict[str, Any]) -> Callable[..., Any]:
                 spread = 1 - 1 / float(np.sqrt(1 + radius * radius))
                 # Even radiance E/(π sin²θ) over the cone's 2π(1 − cosθ).
                 light = intensity * (2 / (2 - spread))
+            elif given["kind"] == "rect":
+                # Points even in area, each a small Lambertian of its part of the whole's candela.
+                at = mi.Point3f(given["position"]) + (2 * sample.x - 1) * mi.Vector3f(given["across"])
+                way = at + (2 * sample.y - 1) * mi.Vector3f(given["along"]) - it.p
+                d2 = dr.maximum(dr.dot(way, way), 1e-8)
+                distance = dr.sqrt(d2)
+                axis = way / distance
+                light = intensity * (dr.maximum(-dr.dot(axis, mi.Vector3f(given["direction"])), 0) / d2)
             else:
                 way = mi.Point3f(given["position"]) - it.p
                 d2 = dr.maximum(dr.dot(way, way), 1e-8)
@@ -362,7 +371,7 @@ def _lamp(mi: Any, dr: Any, content: dict[str, Any]) -> Callable[..., Any]:
                 cosine = -dr.dot(axis, mi.Vector3f(given["direction"]))
                 falloff = dr.clip(cosine * given["cone_scale"] + given["cone_offset"], 0, 1)
                 light = light * falloff * falloff
-            if radius > 0:
+            if radius > 0 and given["kind"] != "rect":
                 up = 1 - sample.x * spread
                 side = dr.sqrt(dr.maximum(0, (1 - up) * (1 + up)))
                 angle = 2 * dr.pi * sample.y

@@ -43,6 +43,7 @@ from tyndall.scene.model import (
     Phase,
     PointLight,
     Rayleigh,
+    RectLight,
     Scene,
     Schlick,
     SpotLight,
@@ -367,6 +368,8 @@ HIGH = DirectionalLight((0.4, -1, -0.3), 2.0)
 LAMP = PointLight((1.5, 2.0, -1.5), 12.0, (1, 0.8, 0.6))
 SPOT = SpotLight((-0.8, 2.6, -2.0), (0.3, -1, -0.2), 25.0, inner_angle=0.4, outer_angle=0.9)
 BALL = PointLight((1.5, 2.0, -1.5), 12.0, radius=0.5)
+PANEL = RectLight((1.5, 2.0, -1.5), (-0.6, -1, -0.4), 12.0, (1, 0.8, 0.6), width=1.6, height=0.5, rotation=0.4)
+SUNK = RectLight((2.2, -1.2, -3.4), (-1, 0.2, -0.3), 6.0, width=1.0, height=1.4, rotation=0.3)  # half under the floor
 VIEW = (6, 4)  # few pixels of many samples: means are normal, as the test has them, when samples are many
 
 SCENES: dict[str, tuple[Scene, int, int]] = {  # with samples and depth
@@ -375,6 +378,8 @@ SCENES: dict[str, tuple[Scene, int, int]] = {  # with samples and depth
     "point light": (occluded(LAMP), 500, 2),
     "spot light": (occluded(SPOT), 500, 2),
     "light with a radius": (occluded(BALL), 500, 2),
+    "rectangular light": (occluded(PANEL), 500, 2),
+    "rectangular light, cut by the floor": (clear(occluded(SUNK)), 1500, 2),
     "soft sun in coloured air": (
         occluded(DirectionalLight((0.4, -1, -0.3), 2.0, angular_diameter=0.2)).with_(
             medium=Medium((0.2, 0.1, 0.05), (0.02, 0.05, 0.1), Rayleigh(), THICK.bounds)

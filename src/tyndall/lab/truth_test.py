@@ -20,15 +20,18 @@ from tyndall.scene.model import (
     DirectionalLight,
     HenyeyGreenstein,
     Instance,
+    Isotropic,
     Light,
     Material,
     Medium,
     Mesh,
     PointLight,
     Rayleigh,
+    RectLight,
     Scene,
     SpotLight,
 )
+from tyndall.techniques.shadow.ray_traced import RayTraced
 from tyndall.techniques.shadow.shadow_map import ShadowMap
 from tyndall.techniques.volumetric.march import March
 
@@ -39,6 +42,7 @@ BEAM = SpotLight((0.6, 0.9, -1.5), (-0.3, -0.5, -0.6), 5.0, inner_angle=0.2, out
 FOG = Medium((0.3, 0.2, 0.1), (0.02, 0.05, 0.3), HenyeyGreenstein(0.4))
 THICK = Medium((2.0, 0.5, 0.0), (0.0, 0.5, 4.0), Rayleigh())
 QUICK = TruthSettings(target=0.0, samples=1024)
+ROUGH = Material("rough", base_color=(0.8, 0.7, 0.6, 1), roughness=1.0)
 BLACK = Material("black", base_color=(0, 0, 0, 1), roughness=1.0)
 
 
@@ -191,6 +195,39 @@ def test_a_penumbra_is_half_lit_at_its_middle(gpu: Gpu) -> None:
         # White paint is not quite Lambert's: the angles of the cone's directions tell a little.
         assert part[-1] == pytest.approx(1, rel=0.02)
         assert 2 <= ((part > 0.01) & (part < 0.99)).sum() < 20
+
+
+PANEL = RectLight((0.4, 1.6, -2.5), (-0.2, -1.0, -0.3), 6.0, (1.0, 0.6, 0.3), width=1.5, height=0.5, rotation=0.3)
+
+
+def test_a_rectangle_lights_a_floor_and_air_as_the_closed_forms_say(gpu: Gpu) -> None:
+    """Lambert's sum at the floor, but for white paint's last gloss; in the air, isotropic and thin, the solid angle."""
+    scene = Scene([props.floor(-1, 20, ROUGH)], [PANEL], props.AHEAD)
+    found = traced(gpu, scene, TruthSettings(target=1e-3))
+    seen = props.rays(scene.camera, SIZE)
+    hit = props.cast(scene, seen.origin, seen.directions)
+    onto = np.isfinite(hit.distance) & (found.depth < 8)
+    expected = props.surface_light(scene, SIZE, hit.normal, np.where(onto, hit.distance, 1))
+    assert onto.sum() > 50
+    np.testing.assert_allclose(found.radiance[onto], expected[onto], rtol=0.02, atol=0.01 * expected[onto].max())
+    air = Medium(1e-3, 0.0, Isotropic(), ((-9, -9, -9), (9, 9, 9)))
+    thin = Scene([props.wall(-6, material=BLACK)], [PANEL], props.AHEAD, air)
+    hazy = traced(gpu, thin, TruthSettings(target=2e-3))
+    scattered = props.quadrature(thin, PANEL, SIZE, 0, 6 * seen.stretch)
+    assert_light(hazy.inscattered, hazy.inscattered_error, scattered, 4e-3)
+
+
+def test_ray_traced_tends_to_the_truth_of_a_rectangle(gpu: Gpu) -> None:
+    """A large panel close over a box, half behind the horizon of its side."""
+    panel = RectLight((-0.9, 0.2, -2.6), (0.9, -1.0, -0.2), 4.0, width=1.6, height=1.0, rotation=0.2)
+    box = props.box((-0.5, -0.9, -3.4), (0.4, -0.3, -2.6), ROUGH)
+    scene = Scene([props.floor(-1, 3, ROUGH), box, props.wall(-4.5, 4, ROUGH)], [panel], props.AHEAD)
+    found = traced(gpu, scene, TruthSettings(target=3e-3))
+    shot = props.shoot(gpu, scene, SIZE, shadow=RayTraced(samples=64, fresh=1), frames=4)
+    hard = props.shoot(gpu, scene, SIZE, shadow=ShadowMap(size=1024))
+    assert props.difference(shot.radiance, found.radiance) < 0.02
+    assert shot.radiance.mean() == pytest.approx(float(found.radiance.mean()), rel=4e-3)
+    assert props.difference(hard.radiance, found.radiance) > 0.1
 
 
 def test_it_agrees_with_the_march_to_the_shadow_maps_error(gpu: Gpu) -> None:

@@ -1,7 +1,7 @@
 """What a user describes, as plain immutable data.
 
 Units and conventions are glTF's: metres, right-handed, +Y up; a camera looks along its -Z; light is linear with Rec.709
-primaries; directional lights are in lux (illuminance of a surface facing them), point and spot lights in candela.
+primaries; directional lights are in lux (illuminance of a surface facing them), the others in candela.
 Every number is declared once (:func:`tyndall.gpu.params.param`); what is outside its range raises a one-line
 :class:`~tyndall.gpu.params.ParameterError`.
 """
@@ -81,7 +81,7 @@ Phase = Isotropic | HenyeyGreenstein | Rayleigh | Gibbons | Schlick
 class Medium(_Checked):
     """A homogeneous participating medium, everywhere or inside an axis-aligned box.
 
-    ``extinction`` is scattering + absorption. Light of point and spot lights is attenuated on its way through the
+    ``extinction`` is scattering + absorption. Light of lights that have a place is attenuated on its way through the
     medium; a directional light's illuminance is that which arrives in the medium.
     """
 
@@ -193,7 +193,53 @@ class SpotLight(_Checked):
         return scale, -math.cos(self.outer_angle) * scale
 
 
-Light = DirectionalLight | PointLight | SpotLight
+@dataclass(frozen=True)
+class RectLight(_Checked):
+    """A rectangle that shines evenly on one side: a panel, a window, a softbox.
+
+    ``intensity`` is the whole rectangle's in candela along its normal; aside it falls by the cosine (Lambert 1760), so
+    that the radiance is ``intensity / (width·height)`` from everywhere in front of it. It is no surface: rays and eyes
+    pass through it.
+
+    Without a ``rotation`` the width is level, and the height as upright as can be; where the light shines straight up
+    or down (to 2.6°), the width lies along ±X instead, and the height along Z.
+    """
+
+    kind: ClassVar[str] = "rect"
+    position: Vec3 = param((0.0, 0.0, 0.0), doc="centre", unit="m")
+    direction: Vec3 = param((0.0, -1.0, 0.0), doc="normal of the side that shines; any length but zero")
+    intensity: float = param(1.0, 0, None, "luminous intensity along the normal", unit="cd")
+    color: Vec3 = param((1.0, 1.0, 1.0), 0, None, "linear colour, multiplies the intensity")
+    width: float = param(1.0, 1e-6, None, "width", unit="m")
+    height: float = param(1.0, 1e-6, None, "height", unit="m")
+    rotation: float = param(0.0, doc="turn about the direction, clockwise as the light travels", unit="rad")
+
+    def __post_init__(self) -> None:
+        check(self)
+        if not any(self.direction):
+            raise ParameterError("direction: (0, 0, 0) is no direction")
+
+    @property
+    def extent(self) -> float:
+        """Radius of the disc of the same area."""
+        return math.sqrt(self.width * self.height / math.pi)
+
+    @property
+    def axes(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """From the centre to the middles of two edges, across and along, each (3,); across × along is against the
+        direction.
+        """
+        direction = np.asarray(self.direction, np.float64)
+        direction = direction / np.linalg.norm(direction)
+        upright = np.array([0.0, 1.0, 0.0]) if abs(direction[1]) < 0.999 else np.array([0.0, 0.0, -1.0])
+        level = np.cross(direction, upright)
+        level /= np.linalg.norm(level)
+        steep = np.cross(level, direction)
+        c, s = math.cos(self.rotation), math.sin(self.rotation)
+        return (c * level - s * steep) * (self.width / 2), (s * level + c * steep) * (self.height / 2)
+
+
+Light = DirectionalLight | PointLight | SpotLight | RectLight
 
 
 # --- geometry -----------------------------------------------------------------------------------------------------

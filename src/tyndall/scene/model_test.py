@@ -19,7 +19,10 @@ from tyndall.scene.model import DirectionalLight, Scene
         ({"background": "red"}, "background: 'red' is not 3 numbers"),
         ({"ambient": (-1, 0, 0)}, "ambient: -1 is outside ≥ 0"),
         ({"ambient": 0.5}, "ambient: 0.5 is not 3 numbers"),
-        ({"lights": (DirectionalLight(), "sun")}, "lights[1]: str is not DirectionalLight or PointLight or SpotLight"),
+        (
+            {"lights": (DirectionalLight(), "sun")},
+            "lights[1]: str is not DirectionalLight or PointLight or SpotLight or RectLight",
+        ),
         ({"instances": [DirectionalLight()]}, "instances[0]: DirectionalLight is not Instance"),
     ],
 )

@@ -32,6 +32,7 @@ from tyndall.scene.model import (
     Mesh,
     Phase,
     PointLight,
+    RectLight,
     Scene,
     SpotLight,
     Texture,
@@ -169,7 +170,7 @@ def test_what_was_saved_comes_back_bit_for_bit(tmp_path_factory: pytest.TempPath
 
 
 def test_every_kind_of_light_and_phase_is_drawn_above() -> None:
-    assert {c.__name__ for c in get_args(Light)} == {"DirectionalLight", "PointLight", "SpotLight"}
+    assert {c.__name__ for c in get_args(Light)} == {"DirectionalLight", "PointLight", "SpotLight", "RectLight"}
     assert len(get_args(Phase)) == 5
     phase = next(f for f in fields_of(Medium) if f.name == "phase")
     assert set(get_args(phase.type)) == set(get_args(Phase))
@@ -189,7 +190,7 @@ def scene() -> Scene:
     second = Mesh(first.positions, np.array([(1, 3, 2)]), first.normals, positions[:, :2], other)
     return Scene(
         (Instance(first), Instance(first, np.diag((1, 2, 3, 1))), Instance(second)),  # type: ignore[arg-type]
-        (SpotLight((0, 3, 0), intensity=30), PointLight((1, 1, 1)), DirectionalLight((0, -1, 0.5))),
+        (SpotLight((0, 3, 0), intensity=30), PointLight((1, 1, 1)), DirectionalLight((0, -1, 0.5)), RectLight(width=2)),
         medium=Medium((0.1,) * 3, (0.2,) * 3, HenyeyGreenstein(0.5), ((-3, -3, -3), (3, 3, 3))),
         looks={"froxel": {"grid": (16, 9, 8)}},
     )
@@ -317,10 +318,13 @@ MISTAKES: list[tuple[str, Any, str]] = [
     ("lights.1.intensty", 3, "lights[1].intensty: no such field — did you mean 'intensity'?"),
     ("lights.1.position", [0, "x", 0], "lights[1].position[1]: 'x' is not a number"),
     ("lights.1.color", [1, 1], "lights[1].color[2]: is missing"),
-    ("lights.2.kind", "directonal", "lights[2].kind: 'directonal' is not one of 'directional', 'point', 'spot'"
+    ("lights.2.kind", "directonal", "lights[2].kind: 'directonal' is not one of 'directional', 'point', 'spot', 'rect'"
                                     " — did you mean 'directional'?"),
     ("lights.2.direction", [0, 0, 0], "lights[2].direction: (0, 0, 0) is no direction"),
     ("lights.0.inner_angle", 1.0, "lights[0].inner_angle: 1 is not below outer_angle, 0.785398"),
+    ("lights.3.width", 0, "lights[3].width: 0 is outside ≥ 1e-06"),
+    ("lights.3.direction", [0, 0, 0], "lights[3].direction: (0, 0, 0) is no direction"),
+    ("lights.3.radius", 1, "lights[3].radius: no such field"),
     ("lights.0", 3, "lights[0]: 3 is not an object"),
     ("lights.0", {}, "lights[0].kind: is missing"),
     ("lights", {}, "lights: an object is not a list"),

@@ -23,6 +23,7 @@ from tyndall.scene.model import (
     Material,
     Medium,
     PointLight,
+    RectLight,
     Scene,
     SpotLight,
     Texture,
@@ -39,6 +40,7 @@ BIG = {
     "directional": {"angular_diameter": 0.2},
     "point": {"radius": 0.2},
     "spot": {"radius": 0.2},
+    "rect": {"width": 0.4, "height": 0.3, "rotation": 0.5},
 }
 
 LIGHTS: list[Any] = [
@@ -47,6 +49,7 @@ LIGHTS: list[Any] = [
     pytest.param(DirectionalLight((0, -1, 0), 3.0), id="zenith"),
     pytest.param(PointLight((-1.2, 2.2, 0.9), 20.0), id="point"),
     pytest.param(SpotLight((-1.5, 3.0, 0.5), (0.5, -1, -0.15), 40.0, (1, 1, 1), 0.5, 0.7), id="spot"),
+    pytest.param(RectLight((-1.2, 2.2, 0.9), (0.5, -1, -0.3), 20.0, width=1e-3, height=1e-3), id="rect"),
 ]
 
 
@@ -211,6 +214,10 @@ def _parts(light: Light) -> list[Light]:
     """Points on and a little outside of the rim of a light, and its centre."""
     rng = np.random.default_rng(2)
     found: list[Light] = [light]
+    if isinstance(light, RectLight):
+        across, along = light.axes
+        corners = [1.1 * (u * across + v * along) for u in (-1, 0, 1) for v in (-1, 0, 1)]
+        return [replace(light, position=tuple(np.array(light.position) + corner)) for corner in corners]
     for offset in rng.normal(size=(24, 3)):
         offset /= np.linalg.norm(offset)
         if isinstance(light, DirectionalLight):
@@ -230,6 +237,7 @@ def _parts(light: Light) -> list[Light]:
         pytest.param(DirectionalLight((0.3, -0.1, 1.0), 5.0), id="directional"),
         pytest.param(PointLight((1.5, 4.5, -6.0), 60.0), id="point"),
         pytest.param(SpotLight((0.5, 5.0, -6.5), (0.0, -1.2, 1.0), 90.0, (1, 1, 1), 0.4, 0.6), id="spot"),
+        pytest.param(RectLight((0.5, 5.0, -6.5), (0.0, -1.2, 1.0), 60.0, width=1e-3, height=1e-3), id="rect"),
     ],
 )
 def test_the_air_is_shaded_as_rays_see_it(gpu: Gpu, name: str, light: Light) -> None:

@@ -16,7 +16,18 @@ from props import WHITE, shoot
 from tyndall.frame import Renderer
 from tyndall.gpu.device import Gpu
 from tyndall.scene.bundled import primitives
-from tyndall.scene.model import Camera, DirectionalLight, Instance, Light, Medium, Mesh, PointLight, Scene, SpotLight
+from tyndall.scene.model import (
+    Camera,
+    DirectionalLight,
+    Instance,
+    Light,
+    Medium,
+    Mesh,
+    PointLight,
+    RectLight,
+    Scene,
+    SpotLight,
+)
 from tyndall.techniques.contract import Technique
 from tyndall.techniques.shadow.ray_traced import RayTraced
 from tyndall.techniques.shadow.shadow_map import ShadowMap
@@ -171,6 +182,8 @@ def penumbra(light: Light, height: float, points: np.ndarray) -> np.ndarray:
     # The edge as seen from a point, projected onto the light's height: a line across the light's disk.
     x, lamp = points[..., 0], np.array(light.position)
     line = x + (0 - x) * lamp[1] / height
+    if isinstance(light, RectLight):
+        return np.clip(0.5 + (lamp[0] - line) / light.width, 0, 1)
     return disk_above_line((lamp[0] - line) / light.radius)
 
 
@@ -179,6 +192,7 @@ def penumbra(light: Light, height: float, points: np.ndarray) -> np.ndarray:
     [
         pytest.param(DirectionalLight((0, -1, 0), 3.0, angular_diameter=0.2), id="sun"),
         pytest.param(PointLight((0.2, 6.0, 0.0), 100.0, radius=0.3), id="lamp"),
+        pytest.param(RectLight((0.2, 6.0, 0.0), (0, -1, 0), 100.0, width=0.5, height=0.3), id="panel"),
     ],
 )
 def test_the_penumbra_of_an_edge_is_the_closed_form(gpu: Gpu, light: Light) -> None:
@@ -213,6 +227,54 @@ def test_a_shrinking_light_ends_as_a_hard_one(gpu: Gpu) -> None:
     assert differs[0] > 0.02
     assert differs[0] > 2 * differs[1] > 4 * differs[2]
     assert differs[3] < 1e-3
+
+
+def share(scene: Scene, light: RectLight, points: np.ndarray, normals: np.ndarray, count: int) -> np.ndarray:
+    """The part of a rectangle's irradiance that reaches points, by count² points of it, and what all of it is."""
+    across, along = light.axes
+    towards = np.array(light.direction) / np.linalg.norm(light.direction)
+    arrives, all_of_it = np.zeros(points.shape[:-1]), np.zeros(points.shape[:-1])
+    for u, v in np.ndindex(count, count):
+        at = light.position + (2 * (u + 0.5) / count - 1) * across + (2 * (v + 0.5) / count - 1) * along
+        way = at - points
+        r = np.linalg.norm(way, axis=-1)
+        each = np.maximum((way * normals).sum(-1), 0) * np.maximum(-(way @ towards), 0) / r**4
+        all_of_it += each
+        arrives += each * props.lit(scene, PointLight(tuple(at)), points + 1e-4 * normals)
+    return np.where(all_of_it > 0, arrives / np.maximum(all_of_it, 1e-30), 0)
+
+
+@pytest.mark.parametrize(
+    "panel",
+    [
+        pytest.param(
+            RectLight((-1.2, 2.2, 0.9), (0.5, -1, -0.3), 20.0, width=1.2, height=0.4, rotation=0.6), id="aside"
+        ),
+        pytest.param(RectLight((0.1, 1.9, 0.3), (0, -1, 0.2), 20.0, width=2.5, height=1.5, rotation=0.6), id="close"),
+        pytest.param(RectLight((-0.9, 0.3, 0.2), (1, 0.1, -0.4), 9.0, width=1.0, height=1.4, rotation=0.3), id="sunk"),
+    ],
+)
+def test_a_panels_shadow_is_the_sum_over_its_points(gpu: Gpu, panel: RectLight) -> None:
+    """Also close over the cube, whose own sides see the panel cut by their horizon, and half under the floor."""
+    scene = Scene([props.floor(0, 4), CUBE], [panel], ABOVE)
+    rays, frames, count = 32, 4, 20
+    got = visible(gpu, scene, RayTraced(samples=rays, fresh=1), frames=frames)
+    points, hit = seen_points(scene)
+    points = points + 1e-5 * hit.normal
+    expected = share(scene, panel, points, hit.normal, count)
+    seen = np.isfinite(hit.distance)
+    for axis in (0, 1):  # not at the silhouette, where the pixel's centre may be rasterised either way
+        for step in (-1, 1):
+            seen &= np.abs(np.roll(hit.normal, step, axis) - hit.normal).max(-1) < 1e-6
+    graded = seen & (expected > 0.03) & (expected < 0.97)
+    assert graded.sum() > 200
+    error = (got - expected)[graded]
+    assert np.sqrt(np.mean(error**2)) < 1.5 / math.sqrt(rays * frames) * 0.5
+    assert abs(error.mean()) < 4e-3
+    # An edge may lie between the sum's points.
+    assert (got[seen & (expected == 1)] > 0.97).mean() > 0.99
+    assert (got[seen & (expected == 1)] == 1).mean() > 0.9
+    assert (got[seen & (expected == 0)] < 0.03).mean() > 0.99
 
 
 def test_a_hard_light_stays_hard_beside_a_soft_one(gpu: Gpu) -> None:

@@ -2,7 +2,8 @@
 
 The scene's depth is drawn from each light; a point is in shadow where something nearer was drawn:
 ``V(p) = 1 if z(p) ≥ depth(p) else 0`` in reversed-Z. Directional lights use an orthographic map fitted to the scene's
-box, spot lights a perspective one, point lights a cube of six. All maps are layers of one depth texture.
+box, spot lights a perspective one, point and rectangular lights a cube of six around their centre. All maps are layers
+of one depth texture.
 
 A surface's own texel would shade it in places ("acne"). Three remedies, each in texels of the map so that they hold
 at any resolution and scale: a constant bias and one that grows with the slope, both towards the light, and an offset
@@ -22,7 +23,7 @@ from numpy.typing import NDArray
 
 from tyndall.content.contract import Casters, Content
 from tyndall.gpu.params import param
-from tyndall.scene.model import DirectionalLight, Light, PointLight, Scene, SpotLight, box_corners
+from tyndall.scene.model import DirectionalLight, Light, PointLight, RectLight, Scene, SpotLight, box_corners
 from tyndall.techniques.contract import Technique, View, Visibility
 
 if TYPE_CHECKING:
@@ -92,8 +93,8 @@ class Layer:
 
 
 def layer_count(light: Light) -> int:
-    """Maps that a light needs: six for a point light, one for the others."""
-    return 6 if isinstance(light, PointLight) else 1
+    """Maps that a light needs: six for a point or rectangular light, one for the others."""
+    return 6 if isinstance(light, (PointLight, RectLight)) else 1
 
 
 def first_layers(scene: Scene) -> list[int]:

@@ -31,6 +31,7 @@ from tyndall.scene.model import (
     Medium,
     PointLight,
     Rayleigh,
+    RectLight,
     Scene,
     Schlick,
     SpotLight,
@@ -391,12 +392,14 @@ NEAR_LIGHTS = [
     pytest.param(SpotLight((0.5, 0.2, -5.0), (-0.1, 0.0, 1.0), 3.0, (1.0, 0.7, 0.4), 0.1, 0.5), id="at the viewer"),
     pytest.param(SpotLight((-0.5, 0.6, -3.0), (1.0, 0.2, -0.3), 3.0, (1.0, 0.7, 0.4), 0.5, 1.45), id="wide"),
     pytest.param(SpotLight((0.7, -0.5, 0.8), (-0.1, 0.1, -1.0), 9.0, (1.0, 0.7, 0.4), 0.2, 0.4), id="headlight"),
+    pytest.param(RectLight((0.6, 1.2, -3.0), (-0.3, -1, -0.2), 3.0, (1, 0.7, 0.4), 0.8, 0.3, 0.5), id="panel"),
+    pytest.param(RectLight((0.1, 0.2, -4.0), (0.6, 0.1, 0.3), 3.0, (1, 0.7, 0.4), 0.3, 0.2), id="edge on"),
 ]
 
 
 @pytest.mark.parametrize("light", NEAR_LIGHTS)
 @pytest.mark.parametrize("name", LIT)
-def test_near_lights_against_quadrature(gpu: Gpu, name: str, light: PointLight | SpotLight) -> None:
+def test_near_lights_against_quadrature(gpu: Gpu, name: str, light: PointLight | SpotLight | RectLight) -> None:
     if name == "screen_space" and light.position[2] > 0:
         pytest.skip(f"{name} sees only lights that are before the camera")
     scene = Scene([props.wall(-6)], [light], AHEAD, AIR)
@@ -417,7 +420,7 @@ def test_near_lights_against_quadrature(gpu: Gpu, name: str, light: PointLight |
 
 @pytest.mark.parametrize("light", NEAR_LIGHTS[:3])
 @pytest.mark.parametrize("name", LIT)
-def test_near_lights_in_endless_air(gpu: Gpu, name: str, light: PointLight | SpotLight) -> None:
+def test_near_lights_in_endless_air(gpu: Gpu, name: str, light: PointLight | SpotLight | RectLight) -> None:
     """Rays to the sky end after no distance that a grid or a number of steps could be made for."""
     scene = Scene([], [light], AHEAD, AIR)
     try:
