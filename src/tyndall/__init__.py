@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from tyndall.scene.stage import stage
     from tyndall.techniques.antialiasing import NoAntialiasing, Taa
     from tyndall.techniques.occlusion import NoOcclusion, RayTracedAo
-    from tyndall.techniques.shadow import RayTraced, ShadowMap, ShadowVolume
+    from tyndall.techniques.shadow import PenumbraWedge, RayTraced, ShadowMap, ShadowVolume
     from tyndall.techniques.tonemap import Aces, Agx, Clip
     from tyndall.techniques.volumetric import Froxel, March, Off, Polygonal, ScreenSpace
 
@@ -77,6 +77,7 @@ __all__ = [
     "NoOcclusion",
     "Off",
     "ParameterError",
+    "PenumbraWedge",
     "Picture",
     "PointLight",
     "Polygonal",
