@@ -25,7 +25,7 @@ PLANE_FORMAT = "depth32float"
 """Of the depth that stands for the plane that a pixel shows."""
 
 SHADE_TARGET: tuple[str, Blend | None] = ("rgba8unorm", Blend("zero", "one-minus-src"))
-"""Images of shade, a channel for each light or plane: it is the light that passes; a fragment takes away what it is drawn with."""
+"""Images of shade, a channel for each light or plane: the light that passes. A fragment takes away what it returns."""
 
 
 class Content(Protocol):

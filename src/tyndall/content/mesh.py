@@ -39,7 +39,6 @@ MAPS = ("base_color", "metallic_roughness", "normal", "emissive")
 _ADDRESS = {"repeat": "repeat", "clamp": "clamp-to-edge", "mirror": "mirror-repeat"}
 
 
-
 @dataclass(frozen=True, eq=False)
 class _Draw:
     mesh: Mesh
