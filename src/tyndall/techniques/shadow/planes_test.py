@@ -116,13 +116,16 @@ def test_a_scene_without_planes_is_refused(gpu: Gpu, name: str) -> None:
     technique = FAMILIES["shadow"].make(name)
     scene = Scene([ball()], [SUN], ABOVE)
     with pytest.raises(
-        Unsupported, match=f"^{name}: shadows fall on planes only, and no plane of the scene has 2 %.*map"
+        Unsupported, match=f"^{name}: shadows fall on planes only, and no plane that .* has 2 %.*map"
     ):
         technique.supports(scene)
     with Renderer(scene, props.TINY, gpu=gpu, volumetric="off", shadow="shadow_map") as renderer:
         with pytest.raises(Unsupported):
             renderer.use("shadow", name)
         assert renderer.technique("shadow").name == "shadow_map"
+    below = props.quad((-9, -1, -9), (9, -1, -9), (9, -1, 9), (-9, -1, 9))  # faces down
+    with pytest.raises(Unsupported, match="camera faces"):
+        technique.supports(Scene([ball(), below], [PointLight((0, -3, 0))], ABOVE))
     technique.supports(Scene([ball(), props.floor(-1)], [SUN], ABOVE))
     technique.supports(Scene([ball()], [], ABOVE))
 
