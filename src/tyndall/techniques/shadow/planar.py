@@ -8,7 +8,7 @@ directional one),
 
 takes p to its shadow. All of the scene is drawn once for each light and plane through M and then the camera, and
 darkens the pixels that show this plane; so edges are exact to the rasteriser's 1/256 of a pixel, at any distance and
-without any map. The light is hard; a radius is ignored.
+without any map. The light is a point or a direction: one with a size is taken for its centre.
 
 M alone also throws "anti-shadows", of what is behind the plane or beyond the light. Here the near plane of the camera's
 clip space is replaced by the receiver, since the height over it is linear in p: what lies in or behind the plane is

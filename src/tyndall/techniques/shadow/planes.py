@@ -96,8 +96,8 @@ def check_planes(name: str, scene: Scene, share: float) -> None:
     """Raise :class:`Unsupported` where a scene with lights has no plane to serve that its camera faces."""
     if scene.lights and not any(plane.seen > 0 for plane in planes_of(scene, 1, share)):
         raise Unsupported(
-            f"{name}: shadows fall on planes only, and no plane that the scene's camera faces has {100 * share:.3g} % of "
-            "the area that its lights can shine on; use shadow_map, or lower share"
+            f"{name}: shadows fall on planes only, and no plane that the scene's camera faces has {100 * share:.3g} % "
+            "of the area that its lights can shine on; use shadow_map, or lower share"
         )
 
 

@@ -21,6 +21,7 @@ from tyndall.scene.model import (
     Light,
     Mesh,
     PointLight,
+    RectLight,
     Scene,
     SpotLight,
     Texture,
@@ -35,6 +36,7 @@ ABOVE = Camera((2.5, 4, 4.5), (0, 0.3, 0), fov=0.8, near=0.05)
 SUN = DirectionalLight((0.5, -1.0, -0.35), 3.0)
 LAMP = PointLight((-1.2, 2.2, 0.9), 20.0)
 SPOT = SpotLight((-1.5, 3.0, 0.5), (0.5, -1, -0.15), 40.0, (1, 1, 1), 0.5, 0.7)
+PANEL = RectLight((-1.2, 2.2, 0.9), (0.5, -1, -0.3), 20.0, width=0.01, height=0.02)
 CUBE = props.box((-0.5, 0.4, -0.5), (0.5, 1.4, 0.5))
 BOTH_SIDES = replace(WHITE, double_sided=True)
 
@@ -115,9 +117,7 @@ def test_what_the_camera_faces_comes_first() -> None:
 def test_a_scene_without_planes_is_refused(gpu: Gpu, name: str) -> None:
     technique = FAMILIES["shadow"].make(name)
     scene = Scene([ball()], [SUN], ABOVE)
-    with pytest.raises(
-        Unsupported, match=f"^{name}: shadows fall on planes only, and no plane that .* has 2 %.*map"
-    ):
+    with pytest.raises(Unsupported, match=f"^{name}: shadows fall on planes only, and no plane that .* has 2 %.*map"):
         technique.supports(scene)
     with Renderer(scene, props.TINY, gpu=gpu, volumetric="off", shadow="shadow_map") as renderer:
         with pytest.raises(Unsupported):
@@ -157,7 +157,7 @@ def agreement(
 
 
 @pytest.mark.parametrize("name", SERVING)
-@pytest.mark.parametrize("light", [SUN, LAMP, SPOT], ids=lambda light: light.kind)
+@pytest.mark.parametrize("light", [SUN, LAMP, SPOT, PANEL], ids=lambda light: light.kind)
 @pytest.mark.parametrize("scale", [1e-2, 1.0, 1e2])
 def test_a_floor_and_a_wall_as_rays_see_them(gpu: Gpu, name: str, light: Light, scale: float) -> None:
     """The caster stands through the floor, and the wall itself casts a shadow on the floor behind it."""
@@ -168,6 +168,8 @@ def test_a_floor_and_a_wall_as_rays_see_them(gpu: Gpu, name: str, light: Light, 
         light = replace(
             light, position=tuple(scale * x for x in light.position), intensity=scale * scale * light.intensity
         )
+        if isinstance(light, RectLight):
+            light = replace(light, width=scale * light.width, height=scale * light.height)
     scene = Scene([scaled(scale, s) for s in shapes], [light], camera)
     share, truth = agreement(gpu, name, scene, of=(0, 1))
     assert 0.02 < (~truth).mean() < 0.98

@@ -7,7 +7,7 @@ slide that the light then projects onto its receivers. A point is looked up wher
 
 with the light's projection P and view V, the point's place M and the bias from clip space to texture coordinates; the
 texture's filter smooths the edge over a texel. Directional and spot lights have one such texture, point lights a cube
-of six. The light is hard; a radius is ignored.
+of six. The light is a point or a direction: one with a size is taken for its centre.
 
 An outline without depth cannot tell what lies before a receiver from what lies behind it, so that in the papers' form
 receivers do not cast, and a receiver behind which a caster stands is wrong. Here a texel has a channel for each
