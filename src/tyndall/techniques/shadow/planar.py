@@ -35,7 +35,16 @@ from tyndall.gpu.device import Raster
 from tyndall.gpu.params import param
 from tyndall.techniques.contract import Technique, View, Visibility
 from tyndall.techniques.shadow.masks import with_air
-from tyndall.techniques.shadow.planes import MOST, Plane, bind_planes, check_planes, flatness, planes_of, source_of
+from tyndall.techniques.shadow.planes import (
+    MOST,
+    Lit,
+    bind_planes,
+    check_planes,
+    flatness,
+    lit_by,
+    planes_of,
+    source_of,
+)
 from tyndall.techniques.shadow.shadow_map import ShadowMap
 
 if TYPE_CHECKING:
@@ -59,7 +68,7 @@ class Planar(Technique):
     )
     receivers: ClassVar[Literal["all", "planes"]] = "planes"
 
-    planes: int = param(8, 1, MOST, "planes at most that get shadows, the largest", rebuild=True)
+    planes: int = param(8, 1, MOST, "planes at most that get shadows", rebuild=True)
     share: float = param(0.02, 0, 1, "part of the scene's area that such a plane has at least", rebuild=True)
     map_size: int = param(1024, 16, 16384, "width and height of a map, for the air", unit="texel", rebuild=True)
 
@@ -71,7 +80,7 @@ class Planar(Technique):
         """Tell the planes apart, then draw the casters of four lights in one pass."""
         gpu, lights = view.gpu, view.scene.lights
         planes = planes_of(view.scene, self.planes, self.share)
-        pairs = self._pairs(view, planes)
+        pairs = lit_by(view.scene, planes)
         images = view.texture(
             "shade", (*view.size, max(1, -(-len(lights) // 4))), SHADE_TARGET[0], dimension="2d-array",
             usage="sampled target",
@@ -84,40 +93,28 @@ class Planar(Technique):
                 native.set_pipeline(pipeline)
                 native.set_bind_group(0, group)
                 native.draw(3)
-        table = view.buffer("flattenings", lambda: self._rows(view, planes, pairs), element=_FLATTENING).read()
+        table = view.buffer("flattenings", lambda: self._rows(view, pairs), element=_FLATTENING).read()
         width, height = view.size
         for image in range(images.size[2]):
             targets = [(images.view(layer=image), (1.0, 1.0, 1.0, 1.0))]
             with gpu.render(f"{view.owner}.flatten", targets, (which.view(), None if content else 0.0)) as native:
-                for row, (light, plane) in enumerate(pairs):
-                    if light // 4 != image:
+                for row, pair in enumerate(pairs):
+                    if pair.light // 4 != image:
                         continue
                     scope = {"camera": view.scope["camera"], "flattenings": table, "flattening": gpu.constant(row)}
-                    depth = (plane + 1) / 32  # as planar.wesl numbers them
+                    depth = (pair.plane + 1) / 32  # as planar.wesl numbers them
                     native.set_viewport(0, 0, width, height, depth, depth)
                     for kind in content:
                         kind.draw_flattened(native, scope)
         return with_air(view, content, self.shader(), {"shade_images": images}, ShadowMap(size=self.map_size))
 
-    def _pairs(self, view: View, planes: Sequence[Plane]) -> list[tuple[int, int]]:
-        """(light, plane) of each light and each plane that it is not in."""
-        near = flatness(view.scene)
-        return [
-            (i, k)
-            for i, light in enumerate(view.scene.lights)
-            for k, plane in enumerate(planes)
-            if plane.towards(light, near) is not None
-        ]
-
-    def _rows(self, view: View, planes: Sequence[Plane], pairs: Sequence[tuple[int, int]]) -> NDArray[Any]:
+    def _rows(self, view: View, pairs: Sequence[Lit]) -> NDArray[Any]:
         near = flatness(view.scene)
         rows = np.zeros(max(1, len(pairs)), view.gpu.dtype(_FLATTENING))
-        for row, (i, k) in zip(rows, pairs, strict=False):
-            light = view.scene.lights[i]
-            plane, source = planes[k].towards(light, near), source_of(light)
-            assert plane is not None
+        for row, pair in zip(rows, pairs, strict=False):
+            source = source_of(view.scene.lights[pair.light])
             # Divided by P·L, so that w is 1 on the plane.
-            row["matrix"] = (np.eye(4) - np.outer(source, plane) / (plane @ source)).T
-            row["plane"] = plane - (0, 0, 0, near)
-            row["channel"][i % 4] = 1
+            row["matrix"] = (np.eye(4) - np.outer(source, pair.row) / (pair.row @ source)).T
+            row["plane"] = pair.row - (0, 0, 0, near)
+            row["channel"][pair.light % 4] = 1
         return rows

@@ -82,6 +82,7 @@ def flatness(scene: Scene) -> float:
 
 
 _known: weakref.WeakKeyDictionary[Scene, tuple[Plane, ...]] = weakref.WeakKeyDictionary()
+_lit: weakref.WeakKeyDictionary[Scene, dict[tuple[Plane, ...], tuple[Lit, ...]]] = weakref.WeakKeyDictionary()
 
 
 def planes_of(scene: Scene, most: int, share: float) -> tuple[Plane, ...]:
@@ -90,6 +91,29 @@ def planes_of(scene: Scene, most: int, share: float) -> tuple[Plane, ...]:
     if found is None:
         found = _known[scene] = _find(scene)
     return tuple(plane for plane in found if plane.share >= share)[:most]
+
+
+@dataclass(frozen=True, eq=False)
+class Lit:
+    """A light and a plane that it shines on, by their numbers, and the plane's row, turned to the light's side."""
+
+    light: int
+    plane: int
+    row: Floats
+
+
+def lit_by(scene: Scene, planes: tuple[Plane, ...]) -> tuple[Lit, ...]:
+    """Each light with each plane that it is not in; found once for the same planes."""
+    known = _lit.setdefault(scene, {})
+    if planes not in known:
+        near = flatness(scene)
+        known[planes] = tuple(
+            Lit(i, k, row)
+            for i, light in enumerate(scene.lights)
+            for k, plane in enumerate(planes)
+            if (row := plane.towards(light, near)) is not None
+        )
+    return known[planes]
 
 
 def check_planes(name: str, scene: Scene, share: float) -> None:

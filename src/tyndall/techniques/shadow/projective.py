@@ -33,8 +33,8 @@ from tyndall.content.contract import SHADE_TARGET
 from tyndall.gpu.params import param
 from tyndall.techniques.contract import Technique, View, Visibility
 from tyndall.techniques.shadow.masks import with_air
-from tyndall.techniques.shadow.planes import MOST, Plane, bind_planes, check_planes, flatness, planes_of
-from tyndall.techniques.shadow.shadow_map import ShadowMap, layer_count, light_layers
+from tyndall.techniques.shadow.planes import MOST, Plane, bind_planes, check_planes, flatness, lit_by, planes_of
+from tyndall.techniques.shadow.shadow_map import ShadowMap, first_layers, layer_count, light_layers
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -57,7 +57,7 @@ class Projective(Technique):
     receivers: ClassVar[Literal["all", "planes"]] = "planes"
 
     size: int = param(1024, 16, 16384, "width and height of an outline's texture", unit="texel", rebuild=True)
-    planes: int = param(8, 1, MOST, "planes at most that get shadows, the largest; four share a texture", rebuild=True)
+    planes: int = param(8, 1, MOST, "planes at most that get shadows; four share a texture", rebuild=True)
     share: float = param(0.02, 0, 1, "part of the scene's area that such a plane has at least", rebuild=True)
     map_size: int = param(1024, 16, 16384, "width and height of a map, for the air", unit="texel", rebuild=True)
 
@@ -91,15 +91,14 @@ class Projective(Technique):
         }
         return with_air(view, content, self.shader(), bindings, ShadowMap(size=self.map_size))
 
-    def _rows(self, view: View, planes: Sequence[Plane]) -> NDArray[Any]:
+    def _rows(self, view: View, planes: tuple[Plane, ...]) -> NDArray[Any]:
         scene, near = view.scene, flatness(view.scene)
         layers = light_layers(scene, self.size)
         rows = np.zeros(max(1, len(layers)), view.gpu.dtype(_SILHOUETTE))
-        lights = [light for light in scene.lights for _ in range(layer_count(light))]
-        for row, layer, light in zip(rows, layers, lights, strict=False):
+        for row, layer in zip(rows, layers, strict=False):
             row["view_proj"] = layer.matrix.T
-            for k, plane in enumerate(planes):
-                towards = plane.towards(light, near)
-                if towards is not None:
-                    row["planes"][k] = towards - (0, 0, 0, near)
+        first = first_layers(scene)
+        for pair in lit_by(scene, planes):
+            its = slice(first[pair.light], first[pair.light] + layer_count(scene.lights[pair.light]))
+            rows["planes"][its, pair.plane] = pair.row - (0, 0, 0, near)
         return rows
