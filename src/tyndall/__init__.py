@@ -49,7 +49,15 @@ if TYPE_CHECKING:
     from tyndall.scene.stage import stage
     from tyndall.techniques.antialiasing import NoAntialiasing, Taa
     from tyndall.techniques.occlusion import NoOcclusion, RayTracedAo
-    from tyndall.techniques.shadow import PenumbraWedge, RayTraced, ShadowMap, ShadowVolume
+    from tyndall.techniques.shadow import (
+        Blurred,
+        PenumbraWedge,
+        Planar,
+        Projective,
+        RayTraced,
+        ShadowMap,
+        ShadowVolume,
+    )
     from tyndall.techniques.tonemap import Aces, Agx, Clip
     from tyndall.techniques.volumetric import Froxel, March, Off, Polygonal, ScreenSpace
 
@@ -58,6 +66,7 @@ __version__ = "0.1.0"
 __all__ = [
     "Aces",
     "Agx",
+    "Blurred",
     "Camera",
     "Clip",
     "Comparison",
@@ -79,8 +88,10 @@ __all__ = [
     "ParameterError",
     "PenumbraWedge",
     "Picture",
+    "Planar",
     "PointLight",
     "Polygonal",
+    "Projective",
     "RayTraced",
     "RayTracedAo",
     "Rayleigh",

@@ -41,6 +41,7 @@ def technique_json(family: str, technique: type[Technique]) -> dict[str, Any]:
         "summary": summary(technique),
         "paper": technique.paper,
         "advice": technique.advice,
+        "receivers": technique.receivers,
         "parameters": [
             {
                 "name": f.name,
@@ -74,7 +75,10 @@ def techniques_table(techniques: list[tuple[str, type[Technique]]]) -> Renderabl
             parts.append(Text(family, style="bold underline"))
         name = technique.name
         about = [f"[bold cyan]{name}[/]  {escape(summary(technique))}"]
-        about += [escape(technique.advice), f"[dim]Paper: {escape(technique.paper)}[/]"]
+        about += [escape(technique.advice)]
+        if technique.receivers == "planes":
+            about += ["Receivers: flat surfaces only; what is not on one of the planes that it serves is lit."]
+        about += [f"[dim]Paper: {escape(technique.paper)}[/]"]
         parts.append(Padding(Text.from_markup("\n".join(about)), (0, 0, 0, 2)))
         if fields := fields_of(technique):
             table = Table(box=None, show_header=False, padding=(0, 2, 0, 0))

@@ -3,7 +3,8 @@
 Content draws itself into the G-buffer and draws its depth from a light; with these two it is seen, and casts and
 receives shadows by every technique that works on images. What consists of polygons can also describe its outline, from
 which shadow volumes and penumbra wedges are made; what cannot, or only in part, says so, and these techniques then take
-the shadow of the rest from a shadow map. Rays meet it through :mod:`tyndall.tracing`.
+the shadow of the rest from a shadow map. What is drawn with triangles or quads can also draw its shadow on planes;
+``casting.wesl`` has what its shaders need for that. Rays meet it through :mod:`tyndall.tracing`.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
+from tyndall.gpu.device import Blend
 from tyndall.gpu.resources import Bound, Resource
 
 if TYPE_CHECKING:
@@ -18,6 +20,12 @@ if TYPE_CHECKING:
 
 Cull = Literal["none", "front", "back"]
 Casters = Literal["all", "beside_outline"]
+
+PLANE_FORMAT = "depth32float"
+"""Of the depth that stands for the plane that a pixel shows."""
+
+SHADE_TARGET: tuple[str, Blend | None] = ("rgba8unorm", Blend("zero", "one-minus-src"))
+"""Images of shade, a channel for each light or plane: the light that passes. A fragment takes away what it returns."""
 
 
 class Content(Protocol):
@@ -38,6 +46,22 @@ class Content(Protocol):
         Args:
             cull: faces to leave out, as the light sees them, of what has faces.
             casters: "beside_outline" leaves out what :meth:`outline` describes.
+        """
+
+    def draw_flattened(self, native_pass: Any, scope: Mapping[str, Bound]) -> None:
+        """Darken what is in its shadow on a plane, as a camera sees it; what cannot be flattened draws nothing.
+
+        Args:
+            scope: binds ``camera``, ``flattenings`` and ``flattening``; the depth test is for equality, and the
+                viewport sets the depth.
+        """
+
+    def draw_silhouette(self, native_pass: Any, scope: Mapping[str, Bound], targets: int) -> None:
+        """Darken what a light sees of it, whatever is nearer; what cannot say where it is draws nothing.
+
+        Args:
+            scope: binds ``silhouettes`` and ``layer``.
+            targets: how many images of shade are drawn at once, with a channel for each plane that it is in front of.
         """
 
     def outline(self) -> Outline | None:

@@ -11,12 +11,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tyndall.content.contract import Casters, Cull
+from tyndall.content.contract import PLANE_FORMAT, SHADE_TARGET, Casters, Cull
 from tyndall.content.outline import Outline, Placed
 from tyndall.gpu.device import Blend, Gpu, Raster
 from tyndall.gpu.resources import Bound, Buffer, Resource, Texture
@@ -37,9 +37,6 @@ _POSITION = (12, ((0, "float32x3", 0),))
 _ATTRIBUTES = (16, ((1, "snorm16x4", 0), (2, "float32x2", 8)))
 MAPS = ("base_color", "metallic_roughness", "normal", "emissive")
 _ADDRESS = {"repeat": "repeat", "clamp": "clamp-to-edge", "mirror": "mirror-repeat"}
-
-_MASKED_DEPTH = Raster(depth=MAP_FORMAT, vertex_buffers=(_POSITION, _ATTRIBUTES))
-_SOLID_DEPTH = Raster(depth=MAP_FORMAT, vertex_buffers=(_POSITION,))
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +63,45 @@ class _Draw:
             Placed(self.mesh, self.first_index, self.base_vertex, self.first_instance + i, self.mirrored, transform)
             for i, transform in enumerate(self.transforms)
         ]
+
+
+_TURNED: Mapping[Cull, Cull] = {"none": "none", "front": "back", "back": "front"}
+_BOUND = {
+    "gbuffer": ("camera",),
+    "depth": ("shadow_layers", "layer"),
+    "flattened": ("camera", "flattenings", "flattening"),
+    "silhouette": ("silhouettes", "layer"),
+}
+
+
+@dataclass(frozen=True)
+class _Way:
+    """A way to draw meshes: what for, the faces that are left out, how many images at once, and the depth's format."""
+
+    kind: Literal["gbuffer", "depth", "flattened", "silhouette"]
+    cull: Cull = "none"
+    targets: int = 0
+    depth: str = MAP_FORMAT
+
+    def program(self, masked: bool) -> tuple[Raster, str, str | None]:
+        """State, vertex and fragment entry point."""
+        streams = (_POSITION, _ATTRIBUTES) if masked else (_POSITION,)
+        shade = (SHADE_TARGET,) * self.targets
+        match self.kind:
+            case "gbuffer":
+                targets = GBUFFER_TARGETS[: self.targets]
+                state = Raster(targets=targets, depth=self.depth, vertex_buffers=(_POSITION, _ATTRIBUTES))
+                return state, "vertex", "fragment"
+            case "depth":
+                state = Raster(depth=self.depth, vertex_buffers=streams)
+                return (state, "depth_vertex", "depth_fragment") if masked else (state, "solid_depth_vertex", None)
+            case "flattened":
+                state = Raster(
+                    targets=shade, depth=self.depth, depth_compare="equal", depth_write=False, vertex_buffers=streams
+                )
+                return state, "flat_vertex", "flat_fragment"
+            case "silhouette":
+                return Raster(targets=shade, vertex_buffers=streams), "silhouette_vertex", "silhouette_fragment"
 
 
 class Meshes:
@@ -196,7 +232,8 @@ class Meshes:
 
     def draw_gbuffer(self, native_pass: Any, scope: Mapping[str, Bound], *, emissive: bool) -> None:
         """Draw into the G-buffer; ``scope`` binds ``camera``."""
-        self._replay(native_pass, "emissive gbuffer" if emissive else "gbuffer", scope, "back")
+        count = len(GBUFFER_TARGETS) if emissive else 2
+        self._replay(native_pass, _Way("gbuffer", "back", count, self._gpu.depth_format), scope)
 
     def draw_depth(self, native_pass: Any, scope: Mapping[str, Bound], cull: Cull, casters: Casters = "all") -> None:
         """Draw depth from a light; ``scope`` binds ``shadow_layers`` and ``layer``.
@@ -205,7 +242,19 @@ class Meshes:
             cull: faces to leave out, as the light sees them; double-sided materials are always drawn whole.
             casters: "beside_outline" leaves out what :meth:`outline` describes.
         """
-        self._replay(native_pass, "depth", scope, cull, casters)
+        self._replay(native_pass, _Way("depth", cull), scope, casters)
+
+    def draw_flattened(self, native_pass: Any, scope: Mapping[str, Bound]) -> None:
+        """Darken what is in its shadow on a plane, as a camera sees it; ``scope`` binds ``camera``, ``flattenings`` and
+        ``flattening``, and the depth test is for equality.
+        """
+        self._replay(native_pass, _Way("flattened", targets=1, depth=PLANE_FORMAT), scope)
+
+    def draw_silhouette(self, native_pass: Any, scope: Mapping[str, Bound], targets: int) -> None:
+        """Darken what a light sees of it, a channel of ``targets`` images for each plane that it casts a shadow on;
+        ``scope`` binds ``silhouettes`` and ``layer``.
+        """
+        self._replay(native_pass, _Way("silhouette", targets=targets), scope)
 
     def casts_beside_outline(self) -> bool:
         """Whether something casts a shadow that :meth:`outline` does not describe: surfaces with holes."""
@@ -220,54 +269,45 @@ class Meshes:
             self._outline = Outline(self._gpu, solid, streams, owner=OWNER) if solid else None
         return self._outline
 
-    def _replay(
-        self, native_pass: Any, kind: str, scope: Mapping[str, Bound], cull: str, casters: Casters = "all"
-    ) -> None:
+    def _replay(self, native_pass: Any, way: _Way, scope: Mapping[str, Bound], casters: Casters = "all") -> None:
         draws = [draw for draw in self._draws if casters == "all" or draw.is_masked]
         if not draws:
             return
-        names = ("shadow_layers", "layer") if kind == "depth" else ("camera",)
-        bound = {name: scope[name] for name in names}
-        key = (kind, cull, casters, tuple(b.key for b in bound.values()))
+        bound = {name: scope[name] for name in _BOUND[way.kind]}
+        key = (way, casters, tuple(b.key for b in bound.values()))
         if key not in self._bundles:
-            self._bundles[key] = self._record(kind, bound, cull, draws)
+            self._bundles[key] = self._record(way, bound, draws)
         native_pass.execute_bundles([self._bundles[key]])
 
-    def _record(self, kind: str, scope: Mapping[str, Any], cull: str, draws: list[_Draw]) -> Any:
+    def _record(self, way: _Way, scope: Mapping[str, Any], draws: list[_Draw]) -> Any:
         gpu = self._gpu
-        emissive = kind == "emissive gbuffer"
-        targets = GBUFFER_TARGETS if emissive else GBUFFER_TARGETS[:2]
-        seen = Raster(targets=targets, depth=gpu.depth_format, vertex_buffers=(_POSITION, _ATTRIBUTES))
-        base = _SOLID_DEPTH if kind == "depth" else seen
-        bundle = gpu.bundle(f"mesh.{kind}", base)
+        bundle = gpu.bundle(f"mesh.{way.kind}", way.program(masked=False)[0])
         bundle.set_index_buffer(self.indices.native, "uint32")
         bundle.set_vertex_buffer(0, self.positions.native)
         bundle.set_vertex_buffer(1, self.attributes.native)
         current: Any = None
         for draw in draws:
-            masked = draw.is_masked
-            faces = "none" if draw.material.double_sided else cull
+            faces: Cull = "none" if draw.material.double_sided else way.cull
             if draw.mirrored:
-                faces = {"none": "none", "front": "back", "back": "front"}[faces]
+                faces = _TURNED[faces]
             bindings = {
                 **scope,
                 "instances": self._instances,
                 "materials": self.materials,
                 **self._maps[id(draw.material)],
             }
-            if kind != "depth":
-                state, vertex, fragment = seen, "vertex", "fragment"
-            elif masked:
-                state, vertex, fragment = _MASKED_DEPTH, "depth_vertex", "depth_fragment"
-            else:
-                state, vertex, fragment = _SOLID_DEPTH, "solid_depth_vertex", None
+            state, vertex, fragment = way.program(draw.is_masked)
             pipeline, group = gpu.raster(
                 MODULE,
                 replace(state, cull=faces),
                 bindings,
                 vertex=vertex,
                 fragment=fragment,
-                features={**_features(draw.material), "scene_emits": emissive},
+                features={
+                    **_features(draw.material),
+                    "scene_emits": way.kind == "gbuffer" and way.targets > 2,
+                    "has_many_planes": way.kind == "silhouette" and way.targets > 1,
+                },
             )
             if pipeline is not current:
                 bundle.set_pipeline(pipeline)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 from numpy.typing import NDArray
 
@@ -34,6 +34,7 @@ class Technique:
         reads_maps: whether it reads the shadow maps themselves, beyond asking for visibility.
         lights_air: whether it asks the shadow technique about points in the air.
         casts_rays: whether it asks :attr:`View.world`; the frame then builds it before it records anything.
+        receivers: what a shadow technique shades: all surfaces, or flat ones only ("planes"); the rest is lit.
     """
 
     name: ClassVar[str]
@@ -42,6 +43,7 @@ class Technique:
     reads_maps: ClassVar[bool] = False
     lights_air: ClassVar[bool] = True
     casts_rays: ClassVar[bool] = False
+    receivers: ClassVar[Literal["all", "planes"]] = "all"
 
     def __post_init__(self) -> None:
         check(self)

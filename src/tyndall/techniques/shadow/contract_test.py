@@ -29,13 +29,19 @@ from tyndall.scene.model import (
     Texture,
 )
 from tyndall.techniques import FAMILIES, Technique
+from tyndall.techniques.contract import Unsupported
+from tyndall.techniques.shadow.planes import flatness, planes_of
 from tyndall.techniques.volumetric.march import March
 
 FAMILY = FAMILIES["shadow"]
 ALL = tuple(FAMILY.members)
 SIZE = (96, 72)
 ABOVE = Camera((2.5, 4, 4.5), (0, 0.3, 0), fov=0.8, near=0.05)
-MAPS: dict[str, dict[str, Any]] = {"shadow_map": {"size": 1024}}
+MAPS: dict[str, dict[str, Any]] = {
+    "shadow_map": {"size": 1024},
+    "blurred": {"radius": 1, "sigma": 0.5, "depth_aware": True},
+}
+BLUR = {"blurred": 1}  # pixels by which an edge is spread on the screen
 BIG = {
     "directional": {"angular_diameter": 0.2},
     "point": {"radius": 0.2},
@@ -57,6 +63,23 @@ def make(name: str, **changes: Any) -> Technique:
     return FAMILY.make(name, changes={**MAPS.get(name, {}), **changes})
 
 
+def served(scene: Scene, technique: Technique, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Where a technique says that it shades: everywhere, or on points of the planes that it chose."""
+    if technique.receivers == "all":
+        return np.ones(points.shape[:-1], bool)
+    near = 2 * flatness(scene)
+    found = np.zeros(points.shape[:-1], bool)
+    for plane in planes_of(scene, technique.planes, technique.share):  # type: ignore[attr-defined]
+        found |= (np.abs(points @ plane.normal + plane.offset) <= near) & (np.abs(normals @ plane.normal) > 0.9)
+    return found
+
+
+def off_edges(name: str, truth: np.ndarray) -> np.ndarray:
+    """Where the truth is the same as far as a technique spreads edges over the screen."""
+    reach = range(-BLUR.get(name, 0), BLUR.get(name, 0) + 1)
+    return np.all([np.roll(truth, (i, j), (0, 1)) == truth for i in reach for j in reach], axis=0)
+
+
 def seen_visibility(
     gpu: Gpu, scene: Scene, technique: Technique, size: tuple[int, int] = SIZE
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, props.Hit]:
@@ -75,6 +98,7 @@ def seen_visibility(
     cosine = -(travels * hit.normal).sum(-1)
     assert not base[sure & (cosine < -0.05)].any(), "what faces away from the light is dark"
     sure &= (full > 0.02 * full.max()) & (cosine > 0.05)
+    sure &= served(scene, technique, seen.at(distance), hit.normal)
     return np.where(sure, base / np.where(sure, full, 1), 0), sure, seen.at(distance), hit
 
 
@@ -87,8 +111,9 @@ def test_a_cube_over_a_plane_as_rays_see_it(gpu: Gpu, name: str, light: Light) -
     scene = Scene([props.floor(0, 4), CUBE], [light], ABOVE)
     visible, sure, points, _ = seen_visibility(gpu, scene, make(name))
     truth = props.lit(scene, light, points)
+    sure &= off_edges(name, truth)
     assert (truth & sure).sum() > 500
-    assert (~truth & sure).sum() > 50
+    assert (~truth & sure).sum() > (20 if name in BLUR else 50)
     agree = (visible > 0.5) == truth
     assert agree[sure].mean() >= 0.99
     # A few texels away from an edge every pixel agrees: no acne, no leak.
@@ -102,7 +127,7 @@ def test_a_cube_over_a_plane_as_rays_see_it(gpu: Gpu, name: str, light: Light) -
     floor = firm & (points[..., 1] < 1e-3)
     assert floor.sum() > 500
     assert agree[floor].all()
-    assert np.abs(visible - truth)[floor].max() < 0.02
+    assert np.abs(visible - truth)[floor].max() < (0.1 if name in BLUR else 0.02)
 
 
 @pytest.mark.parametrize("name", ALL)
@@ -124,7 +149,7 @@ def test_no_acne_on_a_plane(gpu: Gpu, name: str, elevation: float, azimuth: floa
 @pytest.mark.parametrize("boards", [False, True])
 def test_no_acne_on_a_plane_that_lies_askew(gpu: Gpu, name: str, scale: float, elevation: float, boards: bool) -> None:
     """No box around its triangles hides what they do themselves; boards are a thousand times as long as wide."""
-    if elevation < 6 and name == "shadow_map":
+    if elevation < 6 and name in ("shadow_map", "blurred"):
         pytest.skip("its bias grows up to a slope of 8")
     turn = props.turned(0.35, 0.4)
     shape = props.boards(1000 * scale, scale, 8) if boards else props.floor(0, 20 * scale)
@@ -172,6 +197,7 @@ def test_a_shadow_across_the_faces_of_a_point_light(gpu: Gpu, name: str) -> None
     scene = Scene([props.floor(0, 4), bar], [light], ABOVE)
     visible, sure, points, _ = seen_visibility(gpu, scene, make(name))
     truth = props.lit(scene, light, points)
+    sure &= off_edges(name, truth)
     assert (~truth & sure).sum() > 50
     assert ((visible > 0.5) == truth)[sure].mean() >= 0.99
 
@@ -202,9 +228,11 @@ def test_a_light_with_a_radius_is_hidden_whole_or_not_at_all(gpu: Gpu, name: str
     visible, sure, points, hit = seen_visibility(gpu, scene, make(name))
     floor = sure & (hit.instance == 0)
     parts = [props.lit(scene, part, points) for part in _parts(big)]
-    all_of_it, none_of_it = np.all(parts, axis=0) & floor, ~np.any(parts, axis=0) & floor
+    all_of_it, none_of_it = np.all(parts, axis=0), ~np.any(parts, axis=0)
+    all_of_it &= off_edges(name, all_of_it) & floor
+    none_of_it &= off_edges(name, none_of_it) & floor
     assert all_of_it.sum() > 500
-    assert none_of_it.sum() > 20
+    assert none_of_it.sum() > (5 if name in BLUR else 20)
     # The parts are the rim and beyond; the map's texels are left to the other tests.
     assert (visible[all_of_it] > 0.97).mean() > 0.995
     assert (visible[none_of_it] < 0.03).mean() > 0.98
@@ -273,6 +301,10 @@ def test_a_scene_without_lights_or_shapes_is_drawn(gpu: Gpu, name: str) -> None:
     assert dark.base[-1].min() == pytest.approx(0.5, rel=2e-3)
     light = DirectionalLight((0.3, -0.1, 1.0), 5.0)
     empty = Scene([], [light], ABOVE, Medium(0.05, bounds=((-1, -1, -1), (1, 1, 1))))
+    if FAMILY.members[name].receivers == "planes":
+        with pytest.raises(Unsupported, match=f"^{name}: shadows fall on planes only"):
+            make(name).supports(empty)
+        return
     got = shoot(gpu, empty, SIZE, volumetric="march", shadow=make(name)).inscattered
     seen = props.rays(ABOVE, SIZE)
     begin, end = props.hit_box(seen.origin, seen.directions, (-1, -1, -1), (1, 1, 1))
@@ -295,7 +327,12 @@ def extremes() -> list[Any]:
 def test_the_ends_of_every_range_draw_something(gpu: Gpu, name: str, changes: dict[str, Any]) -> None:
     lights = [DirectionalLight((0.5, -1.0, -0.35), 3.0), PointLight((-1.2, 2.2, 0.9), 20.0, radius=0.1)]
     scene = Scene([props.floor(0, 4), CUBE], lights, ABOVE)
-    base = shoot(gpu, scene, (24, 18), shadow=make(name, **changes), frames=2).base
+    technique = make(name, **changes)
+    try:
+        technique.supports(scene)
+    except Unsupported as refusal:
+        pytest.skip(str(refusal))
+    base = shoot(gpu, scene, (24, 18), shadow=technique, frames=2).base
     assert np.isfinite(base).all()
     assert base.mean() > 0.1
 
@@ -349,6 +386,7 @@ def test_holes_of_a_masked_caster_let_the_light_through(gpu: Gpu, name: str) -> 
     visible, sure, points, hit = seen_visibility(gpu, scene, make(name))
     floor = sure & (hit.instance == 0)
     truth = props.lit(scene, light, points)
+    floor &= off_edges(name, truth)
     assert ((visible > 0.5) == truth)[floor].mean() >= 0.985
     under = floor & (np.abs(points[..., [0, 2]]) < 0.8).all(-1)
     assert 0.3 < truth[under].mean() < 0.7
