@@ -93,7 +93,9 @@ class Counter:
         for light, stencil, _ in self.each_with_silhouettes():
             yield light, stencil
 
-    def each_with_silhouettes(self, *, segments: bool = False, sheet: Sheet = "both") -> Iterator[tuple[int, Texture, list[Silhouette]]]:
+    def each_with_silhouettes(
+        self, *, segments: bool = False, sheet: Sheet = "both"
+    ) -> Iterator[tuple[int, Texture, list[Silhouette]]]:
         """The same, and the light's silhouettes."""
         view, gpu = self._view, self._view.gpu
         depth = view.images["depth"]

@@ -93,9 +93,7 @@ def silhouettes(
 class _Extraction:
     """The buffers of one outline."""
 
-    def __init__(
-        self, view: View, label: str, outline: Outline, caps: bool, segments: bool, sheet: Sheet
-    ) -> None:
+    def __init__(self, view: View, label: str, outline: Outline, caps: bool, segments: bool, sheet: Sheet) -> None:
         self._view, self._outline, self._caps, self._sheet = view, outline, caps, sheet
         gpu, lights = view.gpu, max(1, len(view.scene.lights))
         inside = [outline.is_inside(light) for light in view.scene.lights]
@@ -145,7 +143,11 @@ class _Extraction:
         if self.segments:
             bound["segments_out"] = self.segments.read_write()
         for entry, threads in (("facing", outline.triangles), ("edges", outline.edges)):
-            made = gpu.compute(f"{view.owner}.silhouettes", _MODULE, entry).bind(bound).features(caps=self._caps, segments=self.segments is not None)
+            made = (
+                gpu.compute(f"{view.owner}.silhouettes", _MODULE, entry)
+                .bind(bound)
+                .features(caps=self._caps, segments=self.segments is not None)
+            )
             prepared = made.prepare()
             groups = max(1, -(-threads // prepared.workgroup[0]))
             prepared.run(min(groups, LINE), -(-groups // LINE), len(lights))
