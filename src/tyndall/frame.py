@@ -157,7 +157,7 @@ class Renderer(Closing):
         self._scope: dict[str, Any] = {
             "camera": self._camera.uniform(),
             "medium": self._medium.uniform(),
-            "lights": self._lights.read(),
+            "lights": self._lights.read().declaring(**light_kinds(self.scene)),
             "black": black.sampled(),
             **{name: self._images[name].sampled() for name in _IMAGES if name != "picture"},
             "inscatter_out": self._images["inscatter"].write(),
@@ -495,6 +495,11 @@ def pack_medium(medium: Medium, dtype: np.dtype[Any]) -> Any:
         row["phase_parameter"] = medium.phase.k
     row["lower"], row["upper"] = medium.bounds or ((-_UNBOUNDED,) * 3, (_UNBOUNDED,) * 3)
     return row
+
+
+def light_kinds(scene: Scene) -> dict[str, bool]:
+    """What shaders may know of the lights when they are compiled."""
+    return {"LIGHTS_RECT": any(isinstance(light, RectLight) for light in scene.lights)}
 
 
 def pack_lights(scene: Scene, dtype: np.dtype[Any]) -> NDArray[Any]:

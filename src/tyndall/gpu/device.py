@@ -796,8 +796,9 @@ def _as_bound(value: Any) -> Bound:
 
 def _bindings_module(names: Sequence[str], slots: Sequence[Slot]) -> str:
     preambles = list(dict.fromkeys(slot.preamble for slot in slots if slot.preamble))
-    imports = [p for p in preambles if p.startswith("import")]
-    structs = [p for p in preambles if not p.startswith("import")]
+    told = [line for preamble in preambles for line in preamble.splitlines()]
+    imports = list(dict.fromkeys(line for line in told if line.startswith("import")))
+    structs = [line for line in told if not line.startswith("import")]
     lines = [
         f"@group(0) @binding({i}) {slot.declaration.format(name=name)}"
         for i, (name, slot) in enumerate(zip(names, slots, strict=True))

@@ -95,8 +95,9 @@ class Bound:
 
     def declaring(self, **constants: bool) -> Bound:
         """The same, with constants that shaders may import beside it: branches on them cost nothing."""
-        lines = "".join(f"const {name} = {str(value).lower()};\n" for name, value in constants.items())
-        return Bound(replace(self.slot, preamble=self.slot.preamble + lines), self.native)
+        lines = [f"const {name} = {str(value).lower()};" for name, value in constants.items()]
+        preamble = "\n".join([*filter(None, [self.slot.preamble]), *lines])
+        return Bound(replace(self.slot, preamble=preamble), self.native)
 
 
 @dataclass(frozen=True)

@@ -70,7 +70,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import tyndall
-from tyndall.frame import depth_range, lights_power, pack_camera, pack_lights, pack_medium
+from tyndall.frame import depth_range, light_kinds, lights_power, pack_camera, pack_lights, pack_medium
 from tyndall.gpu.device import Gpu, GpuError
 from tyndall.gpu.params import ParameterError, check, param
 from tyndall.gpu.resources import Buffer, Closing
@@ -403,7 +403,7 @@ class _Tracer(Closing):
                     np.array([pack_medium(scene.medium, gpu.dtype("package::wesl::medium::Medium"))]),
                     "package::wesl::medium::Medium",
                 ).uniform(),
-                "lights": self._lights(lit).read(),
+                "lights": self._lights(lit).read().declaring(**light_kinds(scene)),
                 "sums": self._sums.split(write=True),
                 "moments": self._moments.split(write=True),
                 "guides": self._guides.split(write=True),

@@ -47,7 +47,11 @@ def ask(
         ),
     ]
     body = "fn evaluate(x: vec4f) -> vec4f { return at(x.xyz, normals[u32(x.w)].xyz); }\n"
-    scope = {"lights": held[0].read(), "medium": held[1].uniform(), "normals": held[2].read()}
+    scope = {
+        "lights": held[0].read().declaring(LIGHTS_RECT=True),
+        "medium": held[1].uniform(),
+        "normals": held[2].read(),
+    }
     try:
         return props.evaluate(gpu, name, IMPORTS + text + body, rows, scope).astype(float)
     finally:
