@@ -86,6 +86,7 @@ def test_every_entry_point_compiles_and_is_used(gpu: Gpu, monkeypatch: pytest.Mo
                     assert np.isfinite(renderer.radiance()).all(), (family, name, changes)
                     drawn += 1
                 renderer.use(family, start[family])
+            assert (renderer.depth() > 0).all()
     assert drawn >= 2 * 10
     for depth in (2, 3):
         trace(scene, (8, 6), TruthSettings(target=1, depth=depth), gpu=gpu, cache=False)

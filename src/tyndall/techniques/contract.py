@@ -94,6 +94,7 @@ class View:
     make_world: Callable[[], World] | None = None
     _resources: dict[str, Resource] = field(default_factory=dict)
     _descriptions: dict[str, Any] = field(default_factory=dict)
+    _kept: dict[str, tuple[Any, Any]] = field(default_factory=dict)
     _params: ParamsBuffer | None = None
     _parts: dict[str, View] = field(default_factory=dict)
 
@@ -133,6 +134,12 @@ class View:
         )
         assert isinstance(made, Buffer)
         return made
+
+    def keep(self, label: str, key: Any, make: Callable[[], Any]) -> Any:
+        """What was made for this label, of nothing that must be destroyed; made anew when the key changes."""
+        if label not in self._kept or self._kept[label][0] != key:
+            self._kept[label] = key, make()
+        return self._kept[label][1]
 
     def _owned(self, label: str, description: Any, make: Any) -> Resource:
         held = self._resources.get(label)
@@ -186,6 +193,7 @@ class View:
             resource.destroy()
         self._resources.clear()
         self._parts.clear()
+        self._kept.clear()
         self._params = None
 
 

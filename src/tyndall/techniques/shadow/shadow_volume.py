@@ -24,7 +24,7 @@ shadow maps. Lights with a size cast the hard shadow of their centre.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Literal
 
@@ -120,16 +120,23 @@ class Counter:
 
     def _draw(self, native: Any, silhouette: Silhouette, caps: bool) -> None:
         view, gpu = self._view, self._view.gpu
-        state = Raster(depth=gpu.depth_format, depth_write=False, stencil=_COUNT[self._method])
         scope = {
             **view.scope,
             **silhouette.outline.bindings,
             "light_index": gpu.constant(silhouette.light),
-            "sides": silhouette.sides,
-            "caps": silhouette.caps,
+            "sides": silhouette.sides.read(),
+            "caps": silhouette.caps.read(),
             "first_side": silhouette.first_side,
             "first_cap": silhouette.first_cap,
         }
+        key = (silhouette.sides.read().key, silhouette.caps.read().key, caps, self._method)
+        label = f"volumes of {silhouette.light} in {silhouette.sides.label}"
+        native.execute_bundles([view.keep(label, key, lambda: self._recorded(scope, silhouette, caps))])
+
+    def _recorded(self, scope: Mapping[str, Any], silhouette: Silhouette, caps: bool) -> Any:
+        """The draws of a silhouette, which is in the same buffers in each frame."""
+        view, gpu = self._view, self._view.gpu
+        state = Raster(depth=gpu.depth_format, depth_write=False, stencil=_COUNT[self._method])
         draws = [("side", 0, state)]
         if caps:
             # A cap lies in the surface that casts, which must not shade itself: it is moved behind by a few of the last
@@ -137,8 +144,10 @@ class Counter:
             draws.append(("near_cap", 16, replace(state, depth_bias=-8, depth_slope_bias=-0.001)))
             if not isinstance(view.scene.lights[silhouette.light], DirectionalLight):
                 draws.append(("far_cap", 16, state))
+        bundle = gpu.bundle("volumes", state)
         for entry, offset, raster in draws:
             pipeline, group = gpu.raster(MODULE, raster, scope, vertex=entry, fragment=None)
-            native.set_pipeline(pipeline)
-            native.set_bind_group(0, group)
-            native.draw_indirect(silhouette.arguments.native, silhouette.offset + offset)
+            bundle.set_pipeline(pipeline)
+            bundle.set_bind_group(0, group)
+            bundle.draw_indirect(silhouette.arguments.native, silhouette.offset + offset)
+        return bundle.finish()

@@ -60,9 +60,15 @@ class Silhouette:
 
 def has_turned(view: View, outlines: Sequence[Outline]) -> bool:
     """Whether something casts with both sides."""
-    return any(
-        not outline.closed or any(any(outline.is_inside(light)) for light in view.scene.lights) for outline in outlines
+    return any(not outline.closed or any(map(any, _insides(view, outline))) for outline in outlines)
+
+
+def _insides(view: View, outline: Outline) -> list[list[bool]]:
+    """For each light and part, whether the light is inside; neither moves, so it is found out once."""
+    found: list[list[bool]] = view.keep(
+        f"insides {id(outline)}", outline, lambda: [outline.is_inside(light) for light in view.scene.lights]
     )
+    return found
 
 
 def silhouettes(
@@ -96,7 +102,7 @@ class _Extraction:
     def __init__(self, view: View, label: str, outline: Outline, caps: bool, segments: bool, sheet: Sheet) -> None:
         self._view, self._outline, self._caps, self._sheet = view, outline, caps, sheet
         gpu, lights = view.gpu, max(1, len(view.scene.lights))
-        inside = [outline.is_inside(light) for light in view.scene.lights]
+        inside = _insides(view, outline)
         self.capacity = (2 if any(map(any, inside)) else 1) * outline.most_records
         self.cap_capacity = outline.triangles if caps else 0
         sides = 48 if segments else 16

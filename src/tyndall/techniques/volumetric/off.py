@@ -21,5 +21,5 @@ class Off(Technique):
     advice: ClassVar[str] = "The base image alone, to see what the air adds and costs."
 
     def render(self, view: View) -> None:
-        """Clear both images."""
-        view.compute("clear").dispatch(*view.size)
+        """Clear both images, once: no other technique writes them while this one is in use."""
+        view.keep("cleared", None, lambda: view.compute("clear").dispatch(*view.size))
