@@ -548,12 +548,13 @@ class Gpu(Closing):
         program = self._program(module, entries, bound, overlay or {}, features or {}, state)
         return program.pipeline, self._group(program, bound)
 
-    def bundle(self, label: str, state: Raster) -> Any:
+    def bundle(self, label: str, state: Raster, *, depth_read_only: bool = False) -> Any:
         """A render bundle encoder for passes with the formats of ``state``: recorded once, replayed at no cost."""
         return self.device.create_render_bundle_encoder(
             label=label,
             color_formats=[format for format, _ in state.targets],
             depth_stencil_format=state.depth,
+            depth_read_only=depth_read_only,
         )
 
     def submit(self) -> None:

@@ -144,7 +144,7 @@ class Counter:
             draws.append(("near_cap", 16, replace(state, depth_bias=-8, depth_slope_bias=-0.001)))
             if not isinstance(view.scene.lights[silhouette.light], DirectionalLight):
                 draws.append(("far_cap", 16, state))
-        bundle = gpu.bundle("volumes", state)
+        bundle = gpu.bundle("volumes", state, depth_read_only=True)
         for entry, offset, raster in draws:
             pipeline, group = gpu.raster(MODULE, raster, scope, vertex=entry, fragment=None)
             bundle.set_pipeline(pipeline)
