@@ -8,9 +8,9 @@ steps. With ``depth = 2``, the meaning of "truth" for all techniques of the fram
   dimmed by the air in front;
 - the air scatters every light once, ``L_v = ∫ σs · p · E · V · e^(−σt·s) ds``: visibility by a shadow ray from a
   sampled point of the camera ray. Under a directional light the density of these points falls with the transmittance
-  (the mean of the channels' densities); for a point or spot light they are even in the angle at the light, inside the
-  spot's cone (Kulla and Fajardo 2012), mixed with the former the denser the air is (balance heuristic: Veach and Guibas
-  1995).
+  (the mean of the channels' densities); for the others they are even in the angle at the light, inside a spot's cone or
+  before a rectangle (Kulla and Fajardo 2012), mixed with the former the denser the air is (balance heuristic: Veach and
+  Guibas 1995).
 
 A greater ``depth`` adds all paths of up to that many edges (camera to surface or air is the first), as Mitsuba's
 ``max_depth`` counts them: light between surfaces, and multiple scattering. The camera ray branches into surface and
@@ -26,8 +26,8 @@ paths end by chance. What bounced rays see:
   and for a truth with bounces it is best set to 0;
 - a surface reflects on both sides, and what its shading normal lets through beneath its true face is absorbed. For the
   camera, as in the frame, single-sided materials have no back;
-- a directional light's illuminance is that which arrives in the medium, so nothing dims it; point and spot lights are
-  dimmed on their way. A light with a size is sampled in the cone that it fills, and is itself not seen.
+- a directional light's illuminance is that which arrives in the medium, so nothing dims it; the others are dimmed on
+  their way. A light with a size is sampled in the cone that it fills, a rectangle in its points; none is itself seen.
 
 **Samples** are Owen-scrambled Sobol points (Burley 2020), which converge faster than random ones, but whose scatter
 says nothing of their error. So a pixel's samples come in batches, each with a scrambling of its own: batches are

@@ -13,11 +13,13 @@ the light, the direction lies above the centre's by as much as makes the irradia
 fades over the whole width of the light, as in the traced reference, and not to nothing as the centre sets. Only a light
 that the horizon cuts and that is hidden in part besides is not exact: the samples are not quite even along the horizon,
 which is at most 1 % of the irradiance of a surface that faces the light, and 2.5 % if the light fills much of the sky.
+Of a rectangular light, points are chosen by the cosine exactly, also where the horizon cuts it: some that are even in
+angle are refused (``wesl/rect.wesl``).
 Where shading normals bend far from the facets, the facets' own shade shows at the terminator, as it does in the traced
 reference.
 
 Points in the air are answered by a ray as well (``air="rays"``): exact, one ray for each of a volumetric technique's
-samples, for a light with a radius to a random point of it. ``air="map"`` leaves the air to shadow maps
+samples, for a light with a size to a random point of it. ``air="map"`` leaves the air to shadow maps
 (:class:`~tyndall.techniques.shadow.shadow_map.ShadowMap`), which is faster where many points are asked for. Maps are
 drawn only then, or when the volumetric technique walks through them.
 """
@@ -43,9 +45,9 @@ class RayTraced(Technique):
     name: ClassVar[str] = "ray_traced"
     paper: ClassVar[str] = "Appel 1968, Some techniques for shading machine renderings of solids; Cook 1984 (soft)"
     casts_rays: ClassVar[bool] = True
-    advice: ClassVar[str] = "Exact for any light, scene and scale, and soft where a light has a radius; costs rays."
+    advice: ClassVar[str] = "Exact for any light, scene and scale, and soft where a light has a size; costs rays."
 
-    samples: int = param(1, 1, 256, "rays a pixel, frame and light with a radius")
+    samples: int = param(1, 1, 256, "rays a pixel, frame and light with a size")
     fresh: int = param(8, 1, 64, "times as many rays, to 64, where a soft shadow remembers nothing")
     history: int = param(32, 1, 2047, "frames that a soft shadow remembers while the camera moves", unit="frame")
     air: Literal["rays", "map"] = param("rays", doc="what answers for points in the air", rebuild=True)
