@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from tyndall.gpu.device import ComputePass, Gpu
 from tyndall.gpu.params import check
 from tyndall.gpu.resources import Bound, Buffer, ParamsBuffer, Resource, Texture
-from tyndall.scene.model import Scene
+from tyndall.scene.model import Camera, Scene
 from tyndall.tracing.world import World
 
 
@@ -90,6 +90,7 @@ class View:
     maps_wanted: bool = False
     air_wanted: bool = True
     make_world: Callable[[], World] | None = None
+    _camera: Camera | None = None
     _resources: dict[str, Resource] = field(default_factory=dict)
     _descriptions: dict[str, Any] = field(default_factory=dict)
     _params: ParamsBuffer | None = None
@@ -100,6 +101,15 @@ class View:
         """The scene for rays, which all techniques of a frame share; built when it is asked for first."""
         assert self.make_world is not None, "this view is of no frame"
         return self.make_world()
+
+    @property
+    def camera(self) -> Camera:
+        """The frame's camera; the scene's until a frame is drawn."""
+        return self._camera or self.scene.camera
+
+    @camera.setter
+    def camera(self, camera: Camera) -> None:
+        self._camera = camera
 
     @property
     def params(self) -> Bound:
@@ -171,6 +181,7 @@ class View:
             )
             self._parts[label] = made
         made.images, made.scope, made.overlay, made.frame = self.images, self.scope, self.overlay, self.frame
+        made.camera = self.camera
         return made
 
     def resources(self) -> list[Resource]:
