@@ -34,7 +34,7 @@ FAMILY = FAMILIES["shadow"]
 ALL = tuple(FAMILY.members)
 SIZE = (96, 72)
 ABOVE = Camera((2.5, 4, 4.5), (0, 0.3, 0), fov=0.8, near=0.05)
-MAPS: dict[str, dict[str, Any]] = {"shadow_map": {"size": 1024}}
+MAPS: dict[str, dict[str, Any]] = {"shadow_map": {"size": 1024}, "pcf": {"radius": 1.0}, "pcss": {}}
 BIG = {
     "directional": {"angular_diameter": 0.2},
     "point": {"radius": 0.2},
