@@ -44,7 +44,7 @@ class Pcss(DepthMaps):
         "overlap."
     )
 
-    search_samples: int = param(16, 1, 64, "places at which blockers are searched")
+    search_samples: int = param(24, 1, 64, "places at which blockers are searched")
     samples: int = param(32, 1, 64, "places that are averaged over the penumbra")
     min_radius: float = param(1.0, 0, 64, "least radius of the disk", unit="texel")
 
