@@ -1,21 +1,22 @@
 """Depth of triangles seen from lights, drawn by compute passes into all maps at once.
 
-A data-centre GPU has few units that rasterise and many that compute: on an H200, 100,000 triangles into one map of 1024²
-texels take its rasteriser 0.3 ms. So triangles are sorted by the size of their boxes on the map (as in Laine and Karras
-2011, *High-performance software rasterization on GPUs*), and depth is kept by an atomic maximum of its bits (Karis et al.
-2021, *Nanite virtualized geometry*), whose order is that of the depths, as these are not negative:
+A data-centre GPU has few units that rasterise and many that compute: on an H200, 100,000 triangles into one map of
+1024² texels take its rasteriser 0.3 ms. So triangles are sorted by the size of their boxes on the map (as in Laine and
+Karras 2011, *High-performance software rasterization on GPUs*), and depth is kept by an atomic maximum of its bits
+(Karis et al. 2021, *Nanite virtualized geometry*), whose order is that of the depths, as these are not negative:
 
 - ``bin``, a thread a triangle and map, drops what is beside the map, culled, or between the centres of texels; fills
   what is small; and lists the others.
 - ``medium``, an indirect dispatch, has 32 threads a triangle of at most 64×64 texels.
-- ``large``, an indirect dispatch, has 64 workgroups a triangle, each of which takes every 64th block of 64×64 texels and
-  leaves out what is outside of an edge. Triangles that cross the near plane, or reach too far aside, are clipped there.
+- ``large``, an indirect dispatch, has 64 workgroups a triangle, each of which takes every 64th block of 64×64 texels
+  and leaves out what is outside of an edge. Triangles that cross the near plane, or reach too far aside, are clipped
+  there.
 
 It draws what a rasteriser does: corners are snapped to 1/256 texel, edge functions are whole numbers and exact, and a
 texel's centre on an edge belongs to one of its two triangles (top-left rule), so that neighbours leave no gap and do
 not overlap. The products of a large triangle's edges have 46 bits; a block takes their value at its corner, which fits
-32 bits, or else is too far from 0 to change its sign within the block. Depths are reversed-Z, of the snapped corners, and
-0 where nothing was drawn.
+32 bits, or else is too far from 0 to change its sign within the block. Depths are reversed-Z, of the snapped corners,
+and 0 where nothing was drawn.
 
 Both lists share a buffer that has a place for every triangle and map, so that none can overflow. Where that would be
 very large, maps are drawn in turns.
