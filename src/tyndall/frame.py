@@ -255,6 +255,7 @@ class Renderer(Closing):
             "package::visibility": visibility.module,
             "package::surface_visibility": visibility.surfaces,
             "package::occlusion": occlusion.module,
+            **visibility.overlay,
         }
 
         gpu.compute("lighting", _MODULE, "lighting").bind(scope, lit_out=images["base"].write()).overlay(

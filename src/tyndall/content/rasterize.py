@@ -8,9 +8,9 @@ Karras 2011, *High-performance software rasterization on GPUs*), and depth is ke
 - ``bin``, a thread a triangle and map, drops what is beside the map, culled, or between the centres of texels; fills
   what is small; and lists the others.
 - ``medium``, an indirect dispatch, has 32 threads a triangle of at most 64×64 texels.
-- ``large``, an indirect dispatch, has 64 workgroups a triangle, each of which takes every 64th block of 64×64 texels
-  and leaves out what is outside of an edge. Triangles that cross the near plane, or reach too far aside, are clipped
-  there.
+- ``large``, an indirect dispatch, has up to 64 workgroups a triangle, which take turns at its blocks of 64×64 texels
+  and leave out those that are outside of an edge. Triangles that cross the near plane, or reach too far aside, are
+  clipped there.
 
 It draws what a rasteriser does: corners are snapped to 1/256 texel, edge functions are whole numbers and exact, and a
 texel's centre on an edge belongs to one of its two triangles (top-left rule), so that neighbours leave no gap and do
@@ -18,8 +18,8 @@ not overlap. The products of a large triangle's edges have 46 bits; a block take
 32 bits, or else is too far from 0 to change its sign within the block. Depths are reversed-Z, of the snapped corners,
 and 0 where nothing was drawn.
 
-Both lists share a buffer that has a place for every triangle and map, so that none can overflow. Where that would be
-very large, maps are drawn in turns.
+Both lists share a buffer that has a place for every triangle and map, so that none can overflow; large triangles get
+more workgroups than one while there is room for them. Where that buffer would be very large, maps are drawn in turns.
 """
 
 from __future__ import annotations
@@ -41,6 +41,7 @@ _MIRRORED, _DOUBLE_SIDED = 1, 2  # as rasterize.wesl has them
 CULLS: tuple[Cull, ...] = ("none", "front", "back")  # as rasterize.wesl numbers them
 _ALIGNED = 256  # bytes at which a binding may begin
 _LARGE_ARGUMENTS = 16  # bytes from a turn's arguments to those of its large triangles
+_EXTRA = 1 << 16  # workgroups, beyond one for each, that large triangles may have
 _ITEM_BYTES = 64 << 20  # a list of this size is for several maps; of a single one, whatever it takes
 
 
@@ -112,7 +113,7 @@ class DepthStack:
 def draws(gpu: Gpu, triangles: Sequence[Triangles], size: int, layers: int) -> bool:
     """Whether this adapter's buffers are large enough."""
     limit = gpu.limits["max-storage-buffer-binding-size"]
-    fits = all(4 * t.count <= limit for t in triangles) and DepthStack.bytes_of(size, 1) <= limit
+    fits = all(8 * (t.count + _EXTRA) <= limit for t in triangles) and DepthStack.bytes_of(size, 1) <= limit
     return fits and DepthStack.bytes_of(size, layers) <= gpu.limits["max-buffer-size"]
 
 
@@ -147,9 +148,11 @@ def rasterize(
     limit = gpu.limits["max-storage-buffer-binding-size"]
     map_bytes = 4 * stack.stride
     most = max(t.count for t in triangles)
-    turn = max(1, min(stack.layers, limit // map_bytes, min(_ITEM_BYTES, limit) // (4 * most)))
+    turn = max(1, min(stack.layers, limit // map_bytes, min(_ITEM_BYTES, limit) // (8 * most)))
     turns = [(t, first) for t in triangles for first in range(0, stack.layers, turn)]
-    items = make_buffer("items", 4 * turn * most, "u32", "storage")
+    extra = min(_EXTRA, 63 * turn * most)
+    item_words = 2 * (turn * most + extra)
+    items = make_buffer("items", 4 * item_words, "u32", "storage")
     counts = make_buffer("counts", _ALIGNED * len(turns), "atomic<u32>", "storage indirect")
     gpu.clear_buffer(counts)
     with gpu.chain(label):
@@ -163,7 +166,8 @@ def rasterize(
                 "first_layer": gpu.constant(first),
                 "part_count": gpu.constant(t.parts),
                 "triangle_count": gpu.constant(t.count),
-                "item_count": gpu.constant(turn * most),
+                "item_words": gpu.constant(item_words),
+                "most_extra": gpu.constant(extra),
                 "map_size": gpu.constant(stack.size),
                 "map_stride": gpu.constant(stack.stride),
                 "cull": gpu.constant(CULLS.index(cull)),

@@ -21,7 +21,7 @@ from tyndall.gpu.device import Gpu, GpuError
 from tyndall.gpu.resources import Buffer
 from tyndall.scene.model import Camera, Instance, Mesh, Scene
 
-_LAYER = "package::techniques::shadow::shadow_map::ShadowLayer"
+_LAYER = "package::techniques::shadow::depth_maps::ShadowLayer"
 OWNER = "test"
 NEAR = 1e-3
 DOWN = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])  # rows right, up, back of one who looks along −y
@@ -285,9 +285,20 @@ def test_every_triangle_of_any_number_is_drawn(gpu: Gpu, count: int) -> None:
 def test_maps_in_turns_are_the_same(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
     scene = [soup(7, 150, 1.5, 0.6)]
     at_once = drawn(gpu, scene, MATRICES["point"], 50)
-    monkeypatch.setattr(rasterizer, "_ITEM_BYTES", 4 * 150 * 4)
+    monkeypatch.setattr(rasterizer, "_ITEM_BYTES", 8 * 150 * 4)
     assert (drawn(gpu, scene, MATRICES["point"], 50) == at_once).all()
     assert (at_once > 0).mean() > 0.1
+
+
+@pytest.mark.parametrize("room", [0, 20, 1000])
+def test_without_room_for_more_workgroups_large_triangles_are_drawn_by_one(
+    gpu: Gpu, monkeypatch: pytest.MonkeyPatch, room: int
+) -> None:
+    scene = [soup(8, 40, 1.0, 3.0)]
+    freely = drawn(gpu, scene, MATRICES["directional"], 300)
+    monkeypatch.setattr(rasterizer, "_EXTRA", room)
+    assert (drawn(gpu, scene, MATRICES["directional"], 300) == freely).all()
+    assert (freely > 0).mean() > 0.5
 
 
 @pytest.mark.parametrize("width", [1.0, 0.2, 0.01])

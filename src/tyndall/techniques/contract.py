@@ -181,7 +181,7 @@ class View:
             )
             self._parts[label] = made
         made.images, made.scope, made.overlay, made.frame = self.images, self.scope, self.overlay, self.frame
-        made.camera = self.camera
+        made.camera, made.maps_wanted, made.air_wanted = self.camera, self.maps_wanted, self.air_wanted
         return made
 
     def resources(self) -> list[Resource]:
@@ -214,12 +214,14 @@ class Visibility:
         bindings: what these modules import from ``package::bindings``.
         maps: the shadow maps, a depth layer per map (reversed-Z; 0 where nothing was drawn); None only where none are
             wanted.
+        overlay: other modules that stand for real ones in all that imports these.
     """
 
     module: str
     surfaces: str
     bindings: Mapping[str, Any]
     maps: Texture | None = None
+    overlay: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,11 @@ so what casts a shadow into the slice need not be inside it.
 they hold at any resolution and scale: a constant bias and one that grows with the slope, both towards the light, and an
 offset along the normal (Holbert 2011). Drawing only back faces (``cull="front"``) is the fourth; it lets light leak
 under thin casters. Points in the air get no bias.
+
+**Rasterizer.** Maps are drawn by the hardware's rasteriser, one pass a map, or by compute passes for all maps at once
+(:mod:`tyndall.content.rasterize`), which is faster on GPUs that mostly compute. Both give the same map, up to 1/256
+texel. ``rasterizer="compute"`` leaves maps to the hardware where they must be a texture, as a volumetric technique walks
+through them, or where something that casts is not made of solid triangles, as materials with holes are.
 """
 
 from __future__ import annotations
@@ -31,6 +36,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tyndall.content.contract import Casters, Content
+from tyndall.content.rasterize import DepthStack, Triangles, rasterize
 from tyndall.gpu.params import param
 from tyndall.scene.model import Camera, DirectionalLight, Light, PointLight, Scene, SpotLight, box_corners
 from tyndall.techniques.contract import Technique, View, Visibility
@@ -38,9 +44,10 @@ from tyndall.techniques.contract import Technique, View, Visibility
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from tyndall.gpu.resources import Buffer
+    from tyndall.gpu.resources import Bound, Buffer
 
 _LAYER = "package::techniques::shadow::depth_maps::ShadowLayer"
+IN_WORDS = {"package::techniques::shadow::map_reads": "package::techniques::shadow::map_words"}
 _MARGIN = 2  # texels at a map's border that show more than what it must cover
 _NEAREST_CUT = 0.01  # of the scene's size: nothing is looked at from closer, so no slice begins there
 
@@ -56,6 +63,7 @@ class DepthMaps(Technique):
     cull: Literal["none", "front", "back"] = param("none", doc="faces left out of the map", rebuild=True)
     cascades: int = param(0, 0, 4, "finer maps of each directional light, for slices of the view", rebuild=True)
     cascade_split: float = param(0.7, 0, 1, "cuts of the view: 0 even, 1 logarithmic")
+    rasterizer: Literal["hardware", "compute"] = param("hardware", doc="what draws solid triangles", rebuild=True)
 
     @property
     def margin(self) -> int:
@@ -64,31 +72,47 @@ class DepthMaps(Technique):
 
     def draw(self, view: View, content: Sequence[Content], casters: Casters) -> Visibility:
         """Draw all maps of what casts."""
-        scene = view.scene
-        first_finer = sum(layer_count(light) for light in scene.lights)
-        count = first_finer + self.cascades * sum(isinstance(light, DirectionalLight) for light in scene.lights)
-        maps = view.texture(
-            "maps", (self.size, self.size, max(1, count)), "depth32float", dimension="2d-array", usage="sampled target"
-        )
+        first_finer = sum(layer_count(light) for light in view.scene.lights)
+        count = self.map_count(view.scene)
         table = view.buffer("layers", lambda: self._rows(view, max(1, count)), element=_LAYER)
         if count > first_finer:
             self._move_finer(view, table, first_finer)
+        shared = {"shadow_layers": table.read(), "shadow_params": view.params}
+        triangles = self._triangles(view, content, casters)
+        if triangles is not None:
+            words = self._draw_words(view, triangles, table.read(), count)
+            return Visibility(self.shader(), self.shader(), {**shared, **words}, overlay=IN_WORDS)
+        size = (self.size, self.size, max(1, count))
+        maps = view.texture("maps", size, "depth32float", dimension="2d-array", usage="sampled target")
         for index in range(count):
             scope = {"shadow_layers": table.read(), "layer": view.gpu.constant(index)}
             with view.gpu.render(view.owner, depth=(maps.view(layer=index), 0.0)) as native:
                 for kind in content:
                     kind.draw_depth(native, scope, self.cull, casters)
-        return Visibility(
-            self.shader(),
-            self.shader(),
-            {
-                "shadow_layers": table.read(),
-                "shadow_maps": maps.sampled(),
-                "shadow_sampler": view.gpu.sampler(compare="greater-equal"),
-                "shadow_params": view.params,
-            },
-            maps,
-        )
+        texture = {"shadow_maps": maps.sampled(), "shadow_sampler": view.gpu.sampler(compare="greater-equal")}
+        return Visibility(self.shader(), self.shader(), {**shared, **texture}, maps)
+
+    def map_count(self, scene: Scene) -> int:
+        """Maps of all lights, the finer ones among them."""
+        finer = self.cascades * sum(isinstance(light, DirectionalLight) for light in scene.lights)
+        return sum(layer_count(light) for light in scene.lights) + finer
+
+    def _triangles(self, view: View, content: Sequence[Content], casters: Casters) -> list[Triangles] | None:
+        """What compute passes draw; None where the hardware is to draw all."""
+        if self.rasterizer == "hardware" or view.maps_wanted or casters != "all":
+            return None
+        if any(kind.casts_beside_outline() for kind in content):
+            return None
+        return [triangles for kind in content if (triangles := kind.triangles()) is not None]
+
+    def _draw_words(self, view: View, triangles: Sequence[Triangles], layers: Bound, count: int) -> dict[str, Any]:
+        def buffer(label: str, size: int, element: str = "u32", usage: str = "storage") -> Buffer:
+            return view.buffer(label, lambda: size, element=element, usage=usage)
+
+        words = buffer("maps", DepthStack.bytes_of(self.size, max(1, count)))
+        stack = DepthStack(self.size, count, words)
+        rasterize(view.gpu, view.owner, triangles, layers, stack, self.cull, buffer)
+        return {"shadow_words": words.split("u32"), "shadow_stride": view.gpu.constant(stack.stride)}
 
     def _rows(self, view: View, count: int) -> NDArray[Any]:
         scene = view.scene

@@ -31,7 +31,9 @@ class Pcf(DepthMaps):
 
     name: ClassVar[str] = "pcf"
     paper: ClassVar[str] = "Reeves, Salesin and Cook 1987, Rendering antialiased shadows with depth maps"
-    advice: ClassVar[str] = "Smooth edges without texels, everywhere as wide; cheap at small radii, grainy at large ones."
+    advice: ClassVar[str] = (
+        "Smooth edges without texels, everywhere as wide; cheap at small radii, grainy at large ones."
+    )
 
     radius: float = param(2.5, 0, 256, "radius of the disk around a place", unit="texel")
     samples: int = param(16, 1, 64, "places on the disk")
