@@ -24,6 +24,7 @@ more workgroups than one while there is room for them. Where that buffer would b
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -125,6 +126,8 @@ def rasterize(
     stack: DepthStack,
     cull: Cull,
     make_buffer: Callable[[str, int, str, str], Buffer],
+    *,
+    chained: bool = True,
 ) -> None:
     """Draw the depth of triangles into all maps of a stack, which it clears first.
 
@@ -133,6 +136,7 @@ def rasterize(
         layers: ``shadow_layers``, a row a map with ``view_proj``.
         cull: faces to leave out, as the light sees them; double-sided materials are always drawn whole.
         make_buffer: gives a buffer of a label, bytes, element and usage; the same one when it is asked again.
+        chained: as one pass; else each dispatch is a pass of its own, ``label.bin`` …, so that it is timed.
 
     Raises:
         GpuError: more triangles or texels than this adapter's buffers hold.
@@ -155,7 +159,7 @@ def rasterize(
     items = make_buffer("items", 4 * item_words, "u32", "storage")
     counts = make_buffer("counts", _ALIGNED * len(turns), "atomic<u32>", "storage indirect")
     gpu.clear_buffer(counts)
-    with gpu.chain(label):
+    with gpu.chain(label) if chained else contextlib.nullcontext():
         for number, (t, first) in enumerate(turns):
             maps = min(turn, stack.layers - first)
             begin = _ALIGNED * number
@@ -172,7 +176,7 @@ def rasterize(
                 "map_stride": gpu.constant(stack.stride),
                 "cull": gpu.constant(CULLS.index(cull)),
             }
-            sort = gpu.compute(label, MODULE, "bin").bind(
+            sort = gpu.compute(f"{label}.bin", MODULE, "bin").bind(
                 scope,
                 raster_items=items.read_write(),
                 raster_counts=counts.window(begin, _ALIGNED, "atomic<u32>", write=True),
@@ -181,7 +185,7 @@ def rasterize(
             groups = -(-t.count // prepared.workgroup[0])
             prepared.run(min(groups, LINE), -(-groups // LINE), maps)
             for entry, arguments in (("medium", begin), ("large", begin + _LARGE_ARGUMENTS)):
-                listed = gpu.compute(label, MODULE, entry).bind(
+                listed = gpu.compute(f"{label}.{entry}", MODULE, entry).bind(
                     scope, raster_items=items.read(), raster_counts=counts.window(begin, _ALIGNED, "u32")
                 )
                 listed.prepare().run_indirect(counts, arguments)

@@ -31,7 +31,9 @@ from tyndall.techniques import FAMILIES, Technique
 from tyndall.techniques.volumetric.march import March
 
 FAMILY = FAMILIES["shadow"]
-ALL = tuple(FAMILY.members)
+# Members with parameters that put other code in their place.
+VARIANTS: dict[str, tuple[str, dict[str, Any]]] = {"shadow_map-compute": ("shadow_map", {"rasterizer": "compute"})}
+ALL = (*FAMILY.members, *VARIANTS)
 SIZE = (96, 72)
 ABOVE = Camera((2.5, 4, 4.5), (0, 0.3, 0), fov=0.8, near=0.05)
 # Blurs of a texel or two, so that edges are where rays see them.
@@ -59,7 +61,8 @@ LIGHTS: list[Any] = [
 
 
 def make(name: str, **changes: Any) -> Technique:
-    return FAMILY.make(name, changes={**MAPS.get(name, {}), **changes})
+    member, variant = VARIANTS.get(name, (name, {}))
+    return FAMILY.make(member, changes={**MAPS.get(member, {}), **variant, **changes})
 
 
 def seen_visibility(
@@ -252,7 +255,7 @@ def test_the_air_is_shaded_as_rays_see_it(gpu: Gpu, name: str, light: Light) -> 
     scene = Scene([*props.slits(-3, 3, 0.5, 3), props.floor(-1.5, 9)], [light], camera, medium)
     size, steps = (16, 12), 128
     # A blur moves the edges of shafts: moments bound what is lit from above.
-    sharp = {"size": 1024, "radius": 0.0} if "radius" in {f.name for f in fields_of(FAMILY.members[name])} else {}
+    sharp = {"size": 1024, "radius": 0.0} if "radius" in {f.name for f in fields_of(type(make(name)))} else {}
     shot = shoot(gpu, scene, size, volumetric=March(steps=256, jitter=0), shadow=make(name, **sharp))
     got = shot.inscattered[..., 0]
     seen = props.rays(camera, size)

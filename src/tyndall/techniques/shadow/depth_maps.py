@@ -21,8 +21,8 @@ under thin casters. Points in the air get no bias.
 
 **Rasterizer.** Maps are drawn by the hardware's rasteriser, one pass a map, or by compute passes for all maps at once
 (:mod:`tyndall.content.rasterize`), which is faster on GPUs that mostly compute. Both give the same map, up to 1/256
-texel. ``rasterizer="compute"`` leaves maps to the hardware where they must be a texture, as a volumetric technique walks
-through them, or where something that casts is not made of solid triangles, as materials with holes are.
+texel. ``rasterizer="compute"`` leaves maps to the hardware where they must be a texture, since a volumetric technique
+walks through them, and where something that casts is not made of solid triangles, as materials with holes are.
 """
 
 from __future__ import annotations

@@ -226,7 +226,55 @@ def test_the_air_is_shaded_everywhere(gpu: Gpu, volumetric: March | str) -> None
     shapes = [*props.slits(-3, 3, 0.5, 3), props.floor(-1.5, 9)]
     scene = Scene(shapes, [DirectionalLight((0.3, -0.1, 1.0), 5.0)], camera, medium)
     plain, finer = (
-        props.shoot(gpu, scene, (24, 18), volumetric=volumetric, shadow=ShadowMap(size=1024, cascades=count)).inscattered
+        props.shoot(
+            gpu, scene, (24, 18), volumetric=volumetric, shadow=ShadowMap(size=1024, cascades=count)
+        ).inscattered
         for count in (0, 3)
     )
     assert props.difference(finer, plain) < (0.03 if isinstance(volumetric, March) else 1e-6)
+
+
+# --- drawn by compute passes --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("cls", ALL)
+@pytest.mark.parametrize(
+    "light",
+    [
+        pytest.param(replace(SUN, angular_diameter=0.05), id="directional"),
+        pytest.param(PointLight((-1.2, 2.2, 0.9), 20.0, radius=0.1), id="point"),
+    ],
+)
+def test_maps_are_the_same_whatever_draws_them(gpu: Gpu, cls: type[DepthMaps], light: Light) -> None:
+    """Finer maps, filters and blurs included."""
+    scene = Scene([props.floor(0, 4), CUBE], [light], ABOVE)
+    shades = []
+    for rasterizer in ("hardware", "compute"):
+        technique = cls(size=128, cascades=1, rasterizer=rasterizer)
+        with Renderer(scene, SIZE, gpu=gpu, volumetric="off", antialiasing="none", shadow=technique) as renderer:
+            renderer.draw()
+            shades.append(renderer.base()[..., 0])
+    assert shades[0].std() > 0.1 * shades[0].mean()
+    close = np.abs(shades[0] - shades[1]) < 0.01 * shades[0].max()
+    assert close.mean() > 0.998
+
+
+def test_what_compute_passes_cannot_draw_the_hardware_does(gpu: Gpu) -> None:
+    """Maps that a volumetric technique walks through, and surfaces with holes; nothing is left of those before."""
+    technique = ShadowMap(size=64, rasterizer="compute")
+    air = Medium(0.05, bounds=((-2, 0, -2), (2, 2, 2)))
+    holes = replace(CUBE.mesh.material, alpha_mode="mask")
+    solid = Scene([props.floor(0, 4), CUBE], [SUN], ABOVE, air)
+    masked = solid.with_(instances=(props.floor(0, 4), props.box((-0.5, 0.4, -0.5), (0.5, 1.4, 0.5), holes)))
+    for scene in (solid, masked):
+        with Renderer(scene, SIZE, gpu=gpu, volumetric="polygonal", antialiasing="none", shadow=technique) as renderer:
+            found = []
+            for volumetric in ("polygonal", "off", "polygonal"):
+                renderer.use("volumetric", volumetric)
+                renderer.draw()
+                found.append(renderer.base())
+                held = {label for owner, label, _ in gpu.ledger if owner == "shadow.shadow_map" and "maps" in label}
+                assert len(held) == 1
+            assert found[0].std() > 0
+            np.testing.assert_allclose(found[1], found[0], atol=0.02 * found[0].max())
+            assert (found[2] == found[0]).all()

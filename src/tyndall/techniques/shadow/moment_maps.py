@@ -47,10 +47,10 @@ class MomentMaps(DepthMaps):
     def render(self, view: View, content: Sequence[Content], casters: Casters = "all") -> Visibility:
         """Draw all maps of what casts, and blur them."""
         drawn = self.draw(view, content, casters)
-        assert drawn.maps is not None
-        size = drawn.maps.size
+        size = (self.size, self.size, max(1, self.map_count(view.scene)))
         half = view.texture("across", size, self.format, dimension="2d-array")
         full = view.texture("blurred", size, self.format, dimension="2d-array")
-        view.compute("across").bind(drawn.bindings, moments_out=half.write()).dispatch(*size)
-        view.compute("down").bind(drawn.bindings, shadow_moments=half, moments_out=full.write()).dispatch(*size)
+        across, down = (view.compute(entry).bind(drawn.bindings).overlay(drawn.overlay) for entry in ("across", "down"))
+        across.bind(moments_out=half.write()).dispatch(*size)
+        down.bind(shadow_moments=half, moments_out=full.write()).dispatch(*size)
         return replace(drawn, bindings={**drawn.bindings, "shadow_moments": full})
