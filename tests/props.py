@@ -513,3 +513,23 @@ def difference(a: Any, b: Any) -> float:
     """Root mean square of a − b relative to the mean of |b|."""
     a, b = np.asarray(a, float), np.asarray(b, float)
     return float(np.sqrt(np.mean((a - b) ** 2)) / np.mean(np.abs(b)))
+
+
+def shade(
+    gpu: Gpu,
+    scene: Scene,
+    shadow: str | Technique,
+    size: tuple[int, int],
+    *,
+    frames: int = 1,
+    camera: Camera | None = None,
+) -> Floats:
+    """(H, W): what of the light reaches what each pixel shows, a mean over frames; 1 where there is none to lose."""
+    with Renderer(scene, size, gpu=gpu, volumetric="off", antialiasing="none", shadow=shadow) as renderer:
+        renderer.draw(camera, casters=False)
+        full = renderer.base()[..., 0].astype(float)
+        got = np.zeros_like(full)
+        for _ in range(frames):
+            renderer.draw(camera)
+            got += renderer.base()[..., 0] / frames
+    return np.where(full > 0, got / np.where(full > 0, full, 1), 1)

@@ -37,7 +37,7 @@ from tyndall.scene.model import (
 )
 from tyndall.techniques import FAMILIES, Technique
 from tyndall.techniques.contract import View
-from tyndall.techniques.shadow.shadow_map import first_layers
+from tyndall.techniques.shadow.depth_maps import first_layers
 from tyndall.tracing.world import World
 
 OWNER = "frame"
@@ -261,6 +261,7 @@ class Renderer(Closing):
             "package::visibility": visibility.module,
             "package::surface_visibility": visibility.surfaces,
             "package::occlusion": occlusion.module,
+            **visibility.overlay,
         }
 
         gpu.compute("lighting", _MODULE, "lighting").bind(scope, lit_out=images["base"].write()).overlay(
@@ -283,6 +284,8 @@ class Renderer(Closing):
     def _view(self, family: str, scope: dict[str, Any] | None = None, overlay: dict[str, str] | None = None) -> View:
         view = self._views[family]
         view.scope, view.overlay, view.frame = scope or self._scope, overlay or {}, self._frame
+        if self._camera_seen is not None:
+            view.camera = self._camera_seen
         return view
 
     def _update(self, camera: Camera, jitter: bool) -> None:

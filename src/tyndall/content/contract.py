@@ -17,6 +17,7 @@ from tyndall.gpu.resources import Bound, Resource
 
 if TYPE_CHECKING:
     from tyndall.content.outline import Outline
+    from tyndall.content.rasterize import Triangles
 
 Cull = Literal["none", "front", "back"]
 Casters = Literal["all", "beside_outline"]
@@ -67,8 +68,11 @@ class Content(Protocol):
     def outline(self) -> Outline | None:
         """The adjacency of the polygons that it casts shadows with; None where it has none."""
 
+    def triangles(self) -> Triangles | None:
+        """The same polygons, for passes in compute that draw their depth; None where it has none."""
+
     def casts_beside_outline(self) -> bool:
-        """Whether something of it casts a shadow that :meth:`outline` does not describe."""
+        """Whether something of it casts a shadow that :meth:`outline` and :meth:`triangles` do not describe."""
 
     def resources(self) -> list[Resource]:
         """What it holds on the device."""

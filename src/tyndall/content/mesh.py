@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from tyndall.content.contract import PLANE_FORMAT, SHADE_TARGET, Casters, Cull
 from tyndall.content.outline import Outline, Placed
+from tyndall.content.rasterize import Triangles
 from tyndall.gpu.device import Blend, Gpu, Raster
 from tyndall.gpu.resources import Bound, Buffer, Resource, Texture
 from tyndall.scene.model import Material, Mesh, Scene
@@ -125,6 +126,7 @@ class Meshes:
         self._maps: dict[int, dict[str, Bound]] = {}
         self._outline: Outline | None = None
         self._outlined = False
+        self._triangles: Triangles | None = None
         try:
             self._upload(scene)
         except BaseException:
@@ -269,6 +271,14 @@ class Meshes:
             self._outline = Outline(self._gpu, solid, streams, owner=OWNER) if solid else None
         return self._outline
 
+    def triangles(self) -> Triangles | None:
+        """All solid triangles, for passes in compute, made on first use and then kept; None where there are none."""
+        solid = [p for draw in self._draws if not draw.is_masked for p in draw.placements()]
+        if self._triangles is None and solid:
+            streams = (self.positions, self.indices, self._instances.read())
+            self._triangles = Triangles(self._gpu, solid, streams, owner=OWNER)
+        return self._triangles
+
     def _replay(self, native_pass: Any, way: _Way, scope: Mapping[str, Bound], casters: Casters = "all") -> None:
         draws = [draw for draw in self._draws if casters == "all" or draw.is_masked]
         if not draws:
@@ -320,8 +330,8 @@ class Meshes:
 
     def resources(self) -> list[Resource]:
         """What the meshes hold on the device."""
-        outline = self._outline.resources() if self._outline else []
-        return [*self._buffers, *self._textures.values(), *outline]
+        made = [one for one in (self._outline, self._triangles) if one is not None]
+        return [*self._buffers, *self._textures.values(), *(resource for one in made for resource in one.resources())]
 
     def forget_bundles(self) -> None:
         """Drop what was recorded, so that destroyed resources are not kept alive by it."""
@@ -334,7 +344,7 @@ class Meshes:
             resource.destroy()
         self._buffers.clear()
         self._textures.clear()
-        self._outline = None
+        self._outline = self._triangles = None
 
 
 def origin_of(mesh: Mesh) -> NDArray[np.float64]:

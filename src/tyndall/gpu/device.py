@@ -758,6 +758,16 @@ class Prepared:
 
     def run(self, x: int, y: int = 1, z: int = 1) -> None:
         """Run that many workgroups: in a pass of its own, or as part of the chain that is open."""
+        with self._pass() as native:
+            native.dispatch_workgroups(x, y, z)
+
+    def run_indirect(self, arguments: Buffer, offset: int = 0) -> None:
+        """As :meth:`run`, of the three numbers of workgroups that stand in a buffer at a byte offset."""
+        with self._pass() as native:
+            native.dispatch_workgroups_indirect(arguments.native, offset)
+
+    @contextlib.contextmanager
+    def _pass(self) -> Iterator[Any]:
         gpu = self.gpu
         native = gpu._chain
         if native is None:
@@ -766,7 +776,7 @@ class Prepared:
             native = encoder.begin_compute_pass(label=self.label, **({"timestamp_writes": stamps} if stamps else {}))
         native.set_pipeline(self.pipeline)
         native.set_bind_group(0, self.group)
-        native.dispatch_workgroups(x, y, z)
+        yield native
         if gpu._chain is None:
             native.end()
 

@@ -279,3 +279,35 @@ def test_a_line_of_more_workgroups_than_one_dimension_holds(gpu: Gpu) -> None:
         ).dispatch_line(len(values))
         assert (gpu.read_buffer(target) == 2 * values).all()
         gpu.forget_groups()
+
+
+_COUNT = """
+import package::bindings::{arguments, window};
+@compute @workgroup_size(4)
+fn ask(@builtin(local_invocation_index) i: u32) {
+    if i < 3u {
+        arguments[i] = array(3u, 2u, 1u)[i];
+    }
+}
+@compute @workgroup_size(4)
+fn count() {
+    atomicAdd(&window[0], 1u);
+}
+"""
+
+
+def test_a_shader_tells_how_many_workgroups_run(gpu: Gpu) -> None:
+    """The second dispatch of a chain reads its size from what the first one wrote; it sees a window of a buffer."""
+    with (
+        gpu.buffer("arguments", 16, owner="test", usage="storage indirect") as arguments,
+        gpu.buffer("counts", np.zeros(128, np.uint32), owner="test") as counts,
+        props.module(gpu, "count_indirect", _COUNT) as path,
+    ):
+        window = counts.window(256, 256, "atomic<u32>", write=True)
+        with gpu.chain("test.chain"):
+            gpu.compute("test.ask", path, "ask").bind(arguments=arguments.read_write()).dispatch(1)
+            gpu.compute("test.count", path, "count").bind(window=window).prepare().run_indirect(arguments)
+        found = gpu.read_buffer(counts)
+        assert found[64] == 3 * 2 * 4
+        assert found.sum() == found[64]
+        gpu.forget_groups()

@@ -245,6 +245,23 @@ class Buffer(Resource):
         """``var<uniform> name: element``, the first one."""
         return self._bound("var<uniform> {name}: ELEMENT;", "uniform", _ALL, self.dtype.itemsize)
 
+    def window(self, offset: int, size: int, element: str, *, write: bool = False) -> Bound:
+        """As the storage binding of ``size`` bytes from ``offset`` on, a multiple of 256; written in compute only.
+
+        Args:
+            element: WESL type to see it as, a scalar or vector, or "atomic<u32>" where it may be written.
+        """
+        key = f"window {offset} {size} {element} {write}"
+        if key not in self._bounds:
+            access, kind = ("read_write", "storage") if write else ("read", "read-only-storage")
+            slot = Slot(
+                f"var<storage, {access}> {{name}}: array<{element}>;",
+                (("buffer", (("type", kind),)),),
+                _COMPUTE if write else _ALL,
+            )
+            self._bounds[key] = Bound(slot, {"buffer": self.native, "offset": offset, "size": size})
+        return self._bounds[key]
+
     def _bound(self, declaration: str, kind: str, visibility: int, size: int) -> Bound:
         if kind not in self._bounds:
             name, preamble = self._named()

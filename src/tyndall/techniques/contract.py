@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from tyndall.gpu.device import ComputePass, Gpu
 from tyndall.gpu.params import check
 from tyndall.gpu.resources import Bound, Buffer, ParamsBuffer, Resource, Texture
-from tyndall.scene.model import Scene
+from tyndall.scene.model import Camera, Scene
 from tyndall.tracing.world import World
 
 
@@ -92,6 +92,7 @@ class View:
     maps_wanted: bool = False
     air_wanted: bool = True
     make_world: Callable[[], World] | None = None
+    _camera: Camera | None = None
     _resources: dict[str, Resource] = field(default_factory=dict)
     _descriptions: dict[str, Any] = field(default_factory=dict)
     _kept: dict[str, tuple[Any, Any]] = field(default_factory=dict)
@@ -103,6 +104,15 @@ class View:
         """The scene for rays, which all techniques of a frame share; built when it is asked for first."""
         assert self.make_world is not None, "this view is of no frame"
         return self.make_world()
+
+    @property
+    def camera(self) -> Camera:
+        """The frame's camera; the scene's until a frame is drawn."""
+        return self._camera or self.scene.camera
+
+    @camera.setter
+    def camera(self, camera: Camera) -> None:
+        self._camera = camera
 
     @property
     def params(self) -> Bound:
@@ -180,6 +190,7 @@ class View:
             )
             self._parts[label] = made
         made.images, made.scope, made.overlay, made.frame = self.images, self.scope, self.overlay, self.frame
+        made.camera, made.maps_wanted, made.air_wanted = self.camera, self.maps_wanted, self.air_wanted
         return made
 
     def resources(self) -> list[Resource]:
@@ -213,12 +224,14 @@ class Visibility:
         bindings: what these modules import from ``package::bindings``.
         maps: the shadow maps, a depth layer per map (reversed-Z; 0 where nothing was drawn); None only where none are
             wanted.
+        overlay: other modules that stand for real ones in all that imports these.
     """
 
     module: str
     surfaces: str
     bindings: Mapping[str, Any]
     maps: Texture | None = None
+    overlay: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

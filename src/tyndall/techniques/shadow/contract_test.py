@@ -34,11 +34,19 @@ from tyndall.techniques.shadow.planes import flatness, planes_of
 from tyndall.techniques.volumetric.march import March
 
 FAMILY = FAMILIES["shadow"]
-ALL = tuple(FAMILY.members)
+# Members with parameters that put other code in their place.
+VARIANTS: dict[str, tuple[str, dict[str, Any]]] = {"shadow_map-compute": ("shadow_map", {"rasterizer": "compute"})}
+ALL = (*FAMILY.members, *VARIANTS)
 SIZE = (96, 72)
 ABOVE = Camera((2.5, 4, 4.5), (0, 0.3, 0), fov=0.8, near=0.05)
+# Blurs of a texel or two, so that edges are where rays see them.
 MAPS: dict[str, dict[str, Any]] = {
     "shadow_map": {"size": 1024},
+    "pcf": {"size": 1024, "radius": 1.0},
+    "pcss": {"size": 1024},
+    "vsm": {"size": 512, "radius": 1.0},
+    "esm": {"size": 512, "radius": 1.0},
+    "evsm": {"size": 512, "radius": 1.0},
     "blurred": {"radius": 1, "sigma": 0.5, "depth_aware": True},
 }
 BLUR = {"blurred": 1}  # pixels by which an edge is spread on the screen
@@ -60,7 +68,8 @@ LIGHTS: list[Any] = [
 
 
 def make(name: str, **changes: Any) -> Technique:
-    return FAMILY.make(name, changes={**MAPS.get(name, {}), **changes})
+    member, variant = VARIANTS.get(name, (name, {}))
+    return FAMILY.make(member, changes={**MAPS.get(member, {}), **variant, **changes})
 
 
 def served(scene: Scene, technique: Technique, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
@@ -117,10 +126,12 @@ def test_a_cube_over_a_plane_as_rays_see_it(gpu: Gpu, name: str, light: Light) -
     agree = (visible > 0.5) == truth
     assert agree[sure].mean() >= 0.99
     # A few texels away from an edge every pixel agrees: no acne, no leak.
-    texel = 10 / 1024 if light.kind == "directional" else 6 / 1024
+    technique = make(name)
+    texel = (10 if light.kind == "directional" else 6) / getattr(technique, "size", 1024)
+    reach = (4 + 4 * getattr(technique, "radius", getattr(technique, "min_radius", 0))) * texel
     firm = sure.copy()
     for axis in range(3):
-        for step in (-4 * texel, 4 * texel):
+        for step in (-reach, reach):
             moved = points + step * np.eye(3)[axis]
             moved[..., 1] = np.maximum(moved[..., 1], 0)
             firm &= props.lit(scene, light, moved) == truth
@@ -149,8 +160,6 @@ def test_no_acne_on_a_plane(gpu: Gpu, name: str, elevation: float, azimuth: floa
 @pytest.mark.parametrize("boards", [False, True])
 def test_no_acne_on_a_plane_that_lies_askew(gpu: Gpu, name: str, scale: float, elevation: float, boards: bool) -> None:
     """No box around its triangles hides what they do themselves; boards are a thousand times as long as wide."""
-    if elevation < 6 and name in ("shadow_map", "blurred"):
-        pytest.skip("its bias grows up to a slope of 8")
     turn = props.turned(0.35, 0.4)
     shape = props.boards(1000 * scale, scale, 8) if boards else props.floor(0, 20 * scale)
     e = math.radians(elevation)
@@ -181,7 +190,8 @@ def test_the_faces_of_a_point_light_meet_without_a_seam(
     visible, sure, points, hit = seen_visibility(gpu, scene, make(name))
     assert sure.mean() > 0.8
     assert visible[sure].mean() >= 0.999
-    assert visible[sure].min() >= 0.95
+    # An exponential map is dim where a wall beside the place is blurred into it.
+    assert visible[sure].min() >= (0.9 if name == "esm" else 0.95)
     way = points - np.array(position)
     largest = np.sort(np.abs(way), axis=-1)
     on_seam = sure & (largest[..., 2] - largest[..., 1] < 0.05)
@@ -235,7 +245,11 @@ def test_a_light_with_a_radius_is_hidden_whole_or_not_at_all(gpu: Gpu, name: str
     assert none_of_it.sum() > (5 if name in BLUR else 20)
     # The parts are the rim and beyond; the map's texels are left to the other tests.
     assert (visible[all_of_it] > 0.97).mean() > 0.995
-    assert (visible[none_of_it] < 0.03).mean() > 0.98
+    if name == "pcss":
+        # The map shows the top of the cube alone, whose penumbra is wider than that of the bottom, where the umbra ends.
+        assert visible[none_of_it].mean() < 0.12
+    else:
+        assert (visible[none_of_it] < 0.03).mean() > 0.98
 
 
 def _parts(light: Light) -> list[Light]:
@@ -274,7 +288,9 @@ def test_the_air_is_shaded_as_rays_see_it(gpu: Gpu, name: str, light: Light) -> 
     camera = Camera((0.4, 0.3, 1.5), (0, 0, -4), fov=0.9, near=0.05)
     scene = Scene([*props.slits(-3, 3, 0.5, 3), props.floor(-1.5, 9)], [light], camera, medium)
     size, steps = (16, 12), 128
-    shot = shoot(gpu, scene, size, volumetric=March(steps=256, jitter=0), shadow=make(name))
+    # A blur moves the edges of shafts: moments bound what is lit from above.
+    sharp = {"size": 1024, "radius": 0.0} if "radius" in {f.name for f in fields_of(type(make(name)))} else {}
+    shot = shoot(gpu, scene, size, volumetric=March(steps=256, jitter=0), shadow=make(name, **sharp))
     got = shot.inscattered[..., 0]
     seen = props.rays(camera, size)
     begin, end = props.hit_box(seen.origin, seen.directions, *medium.bounds)  # type: ignore[misc]
@@ -318,8 +334,11 @@ def extremes() -> list[Any]:
         for f in fields_of(cls):
             for value in (f.param.low, f.param.high):
                 small = "size" not in f.name or value == f.param.low  # the largest map is a gigabyte
+                # Of a small map, since a software adapter takes a minute for the widest blur of seven large ones.
+                size = {"size": 128} if "size" in {g.name for g in fields_of(cls)} else {}
                 if isinstance(value, (int, float)) and small:
-                    found.append(pytest.param(name, {f.name: f.type(value)}, id=f"{name}.{f.name}={value:g}"))
+                    changes = {**size, f.name: f.type(value)}
+                    found.append(pytest.param(name, changes, id=f"{name}.{f.name}={value:g}"))
     return found
 
 

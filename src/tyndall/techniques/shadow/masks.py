@@ -34,4 +34,4 @@ def with_air(
     if not (view.air_wanted or view.maps_wanted):
         return Visibility(maps.shader(), surfaces, bindings)
     drawn = maps.render(view.part(maps), content)
-    return Visibility(drawn.module, surfaces, {**bindings, **drawn.bindings}, drawn.maps)
+    return Visibility(drawn.module, surfaces, {**bindings, **drawn.bindings}, drawn.maps, drawn.overlay)

@@ -32,9 +32,10 @@ from numpy.typing import NDArray
 from tyndall.content.contract import SHADE_TARGET
 from tyndall.gpu.params import param
 from tyndall.techniques.contract import Technique, View, Visibility
+from tyndall.techniques.shadow.depth_maps import first_layers, layer_count, light_layers
 from tyndall.techniques.shadow.masks import with_air
 from tyndall.techniques.shadow.planes import MOST, Plane, bind_planes, check_planes, flatness, lit_by, planes_of
-from tyndall.techniques.shadow.shadow_map import ShadowMap, first_layers, layer_count, light_layers
+from tyndall.techniques.shadow.shadow_map import ShadowMap
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

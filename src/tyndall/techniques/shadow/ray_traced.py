@@ -77,4 +77,4 @@ class RayTraced(Technique):
         maps = ShadowMap(size=self.map_size)
         drawn = maps.render(view.part(maps), content)
         air = drawn.module if self.air == "map" else self.shader()
-        return Visibility(air, self.shader(), {**bindings, **drawn.bindings}, drawn.maps)
+        return Visibility(air, self.shader(), {**bindings, **drawn.bindings}, drawn.maps, drawn.overlay)

@@ -38,7 +38,7 @@ from tyndall.gpu.params import param
 from tyndall.gpu.resources import Texture
 from tyndall.scene.model import DirectionalLight, Scene
 from tyndall.techniques.contract import Technique, Unsupported, View
-from tyndall.techniques.shadow.shadow_map import first_layers, layer_count
+from tyndall.techniques.shadow.depth_maps import first_layers, layer_count
 from tyndall.techniques.volumetric.paper import refuse_near_lights
 
 _STATE = Raster(targets=(("rgba32float", ADD),), topology="triangle-strip")
