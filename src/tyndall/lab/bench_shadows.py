@@ -6,7 +6,7 @@
   ``shadows``. GPU time of the whole frame and of the family's own passes; host time to encode and submit; the wall
   clock of a whole frame, from the first call until the device is done; memory;
 - **errors**: against the traced truth, lit by a point light and by a ball of half a metre, in ``shadows`` and
-  ``interior`` (where that is larger than the lamp's shade, whose shadow is then nearly gone);
+  ``interior`` (where it hangs free in the room: it is larger than the lamp's shade);
 - **shrink**: the error as the light shrinks to a point, of the techniques that follow its size, against the truth of
   that light and against the hard shadow;
 - **resolution**: the error of what draws maps, against their size;
@@ -17,9 +17,11 @@
 The frame is G-buffer, shadows, lighting, composite and tone mapping ("aces"): nothing is in the air, no ambient
 occlusion, no antialiasing. A technique stands at its own defaults, and "name/choice" is another of its ways.
 
-Pictures are held against the truth in the light ``L_b·T`` that surfaces send to the eye. *Equal* is the share of pixels
-whose three 8-bit values, tone mapped, differ from the truth's by one step at most; it is only asked where light has no
-size, since the truth then has no noise.
+Pictures are held against the truth in the light ``L_b·T`` that surfaces send to the eye. Where light has no size, the
+truth's visibility of it is 0 or 1 in each pixel, and is what a frame without casters, or without the light, is nearer
+to. *Equal* is then the share of pixels whose light is what the frame gives for that visibility, to 1/255 of the
+light's own part and the rounding of half floats; *right*, the share of those that are nearer to it than to the other.
+So neither knows of what the frame and the truth see differently apart from shadows, as 8-bit albedo.
 
 What a technique refuses is written down with its reason, and so is a fault: the others go on. With a folder, each
 figure is kept at once, and a run that was stopped goes on where it was. ``quick`` measures the same things in small.
@@ -55,7 +57,7 @@ from tyndall.lab.stage import Stage, adapter_name, describe, driver_name
 from tyndall.lab.standard import Standard
 from tyndall.lab.truth import TruthSettings
 from tyndall.scene import bundled
-from tyndall.scene.model import DirectionalLight, PointLight, Scene
+from tyndall.scene.model import DirectionalLight, PointLight, Scene, Vec3
 from tyndall.techniques import FAMILIES
 from tyndall.techniques.contract import Technique, Unsupported
 
@@ -66,6 +68,8 @@ PARTS = ("cells", "errors", "shrink", "resolution", "situations", "silhouettes")
 FOLLOWS = 0.25  # of the change that the truth shows, by which a technique counts as one that follows the light's size
 
 _METHODS = ("zpass", "zfail")
+# In metres, where the ball is in no surface and the camera still stands in the table's shadow.
+_PLACES: Mapping[str, Vec3] = {"interior": (-0.8, 1.85, -0.2)}
 
 Progress = Callable[[float, str], object]
 Row = dict[str, Any]
@@ -245,18 +249,21 @@ def counted(triangles: int, lights: int = 1) -> Scene:
     return scene
 
 
-def lit_by_a_ball(scene: Scene, radius: float) -> Scene:
+def lit_by_a_ball(scene: Scene, radius: float, place: Vec3 | None = None) -> Scene:
     """The scene lit by its first light alone, as one that shines in all directions, of a radius in metres.
 
     Where that light is a directional one it comes from its direction, at the scene's own distance, as bright there.
+    ``place`` is where the ball is put instead.
     """
     light = scene.lights[0]
+    if place is not None and not isinstance(light, DirectionalLight):
+        light = PointLight(place, light.intensity, light.color)
     if isinstance(light, DirectionalLight):
         low, high = scene.bounds
         reach = float(np.linalg.norm(high - low))
         towards = np.asarray(light.direction) / np.linalg.norm(light.direction)
-        place = 0.5 * (low + high) - reach * towards
-        ball = PointLight(tuple(place), light.intensity * reach**2, light.color, radius)
+        x, y, z = (float(v) for v in 0.5 * (low + high) - reach * towards)
+        ball = PointLight((x, y, z), light.intensity * reach**2, light.color, radius)
     else:
         ball = PointLight(light.position, light.intensity, light.color, radius)
     return scene.with_(lights=(ball,))
@@ -337,6 +344,19 @@ class _Kept:
         if self._path:
             with self._path.open("a", encoding="utf-8") as file:
                 file.write(json.dumps({"key": key, "row": row}, ensure_ascii=False) + "\n")
+
+
+@dataclass(frozen=True, eq=False)
+class _Known:
+    """A truth, and the frame's own light without the light and without shadows where that has no size."""
+
+    standard: Standard
+    ends: tuple[NDArray[np.float32], NDArray[np.float32]] | None
+
+    @property
+    def target(self) -> metrics.Target:
+        """The light of surfaces."""
+        return self.standard.targets["surfaces"]
 
 
 @dataclass
@@ -433,7 +453,7 @@ class _Run:
 
     def _error_scene(self, name: str, radius: float) -> Scene:
         scene = counted(self.s.error_triangles) if name == "shadows" else bundled.SCENES[name]()
-        return lit_by_a_ball(scene, radius)
+        return lit_by_a_ball(scene, radius, _PLACES.get(name))
 
     def _judged(
         self, part: str, scene: Scene, radius: float, labels: Sequence[str], *, timed: bool = False
@@ -448,15 +468,19 @@ class _Run:
                 lambda technique: self._error(technique, truth(), scene, radius, timed=timed),
             )  # fmt: skip
 
-    def _truth(self, scene: Scene, size: tuple[int, int]) -> Callable[[], Standard]:
+    def _truth(self, scene: Scene, size: tuple[int, int]) -> Callable[[], _Known]:
         """The truth of a scene, found when it is asked for first."""
-        found: list[Standard] = []
+        found: list[_Known] = []
 
-        def ask() -> Standard:
+        def ask() -> _Known:
             if not found:
                 self._say(self.done / self._total, f"truth of {scene.name}")
                 settings = TruthSettings(target=self.s.target, seconds=self.s.truth_seconds, filter="centre")
-                found.append(standard.prepare(self.desk.stage(scene, size), "shadow", "traced", settings))
+                stage = self.desk.stage(scene, size)
+                known = standard.prepare(stage, "shadow", "traced", settings)
+                hard = all(light.extent == 0 for light in scene.lights)
+                ends = (stage.unlit().surfaces, stage.unshadowed().surfaces) if hard else None
+                found.append(_Known(known, ends))
             return found[0]
 
         return ask
@@ -464,7 +488,7 @@ class _Run:
     def _error(
         self,
         technique: Technique,
-        known: Standard,
+        known: _Known,
         scene: Scene,
         radius: float,
         *,
@@ -474,12 +498,11 @@ class _Run:
         stage = self.desk.stage(scene, size or self.s.error_size)
         times = _times(self._measured(stage, technique)) if timed else {}
         still = stage.still(technique, frames=SOFT_FRAMES if radius > 0 else 1)
-        target = known.targets["surfaces"]
         return {
             **times,
-            **_compared(still.surfaces, target, None if radius > 0 else (still.picture.pixels, known.still)),
-            "noise": metrics.rounded(known.noise["surfaces"]),
-            "samples": known.truth.samples,
+            **_compared(still.surfaces, known),
+            "noise": metrics.rounded(known.standard.noise["surfaces"]),
+            "samples": known.standard.truth.samples,
         }
 
     def _shrink(self) -> Iterator[Row]:
@@ -489,15 +512,15 @@ class _Run:
         hard = self._truth(hard_scene, size)
         pictures: dict[str, NDArray[np.float32]] = {}
 
-        def against(technique: Technique, scene: Scene, known: Standard, radius: float, label: str) -> Row:
-            hard_light = hard().targets["surfaces"].light
+        def against(technique: Technique, scene: Scene, known: _Known, radius: float, label: str) -> Row:
+            hard_light = hard().target.light
             if label not in pictures:
                 pictures[label] = self.desk.stage(hard_scene, size).still(technique).surfaces
             light = pictures[label]
             if radius > 0:
                 light = self.desk.stage(scene, size).still(technique, frames=SOFT_FRAMES).surfaces
-            target = known.targets["surfaces"]
-            found = {**_compared(light, target, None), "to_hard": metrics.rounded(metrics.rel_rmse(light, hard_light))}
+            target = known.target
+            found = {**_compared(light, known), "to_hard": metrics.rounded(metrics.rel_rmse(light, hard_light))}
             found["truth_to_hard"] = metrics.rounded(metrics.rel_rmse(target.light, hard_light))
             if radius == largest:
                 right = metrics.rmse(target.light, hard_light)
@@ -629,24 +652,40 @@ def _times(found: Measurement) -> Row:
     }
 
 
-def _compared(
-    light: NDArray[np.float32],
-    target: metrics.Target,
-    pixels: tuple[NDArray[np.uint8], NDArray[np.uint8]] | None,
-) -> Row:
-    """Errors against truth; ``pixels`` are ours and the truth's as they are shown, where each is right or wrong."""
+def _compared(light: NDArray[np.float32], known: _Known) -> Row:
+    """Errors against truth, and of a hard one in how many pixels there are none."""
+    target = known.target
     found: dict[str, float | None] = {
         "rel_rmse": metrics.rel_rmse(light, target.light, target.error),
         "boundary": metrics.boundary(light, target),
         "bias": metrics.bias(light, target.light),
     }
-    if pixels is not None:
-        own, truth = (p.astype(np.int16) for p in pixels)
-        equal = (np.abs(own - truth) <= 1).all(axis=-1)
-        found["equal"] = float(equal.mean())
+    if known.ends is not None:
+        equal, right = agreement(light, target.light, *known.ends)
         away = equal[~target.edges] if target.edges is not None else equal
+        found["equal"], found["right"] = float(equal.mean()), float(right.mean())
         found["equal_off_edges"] = float(away.mean()) if away.size else None
     return {name: metrics.rounded(value) for name, value in found.items()}
+
+
+def agreement(
+    light: NDArray[np.floating[Any]],
+    truth: NDArray[np.floating[Any]],
+    unlit: NDArray[np.floating[Any]],
+    full: NDArray[np.floating[Any]],
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """(equal, right) of each pixel under one light without a size, as the module says; all light is (H, W, 3).
+
+    Args:
+        unlit, full: the frame's own light where nothing of the light arrives, and where all of it does.
+    """
+    x, r, low, high = (np.asarray(a, np.float64) for a in (light, truth, unlit, full))
+    seen = r.sum(axis=-1) > 0.5 * (low + high).sum(axis=-1)
+    expected = np.where(seen[..., None], high, low)
+    part = np.maximum(high - low, 0)
+    rounding = 2.0**-10 * high
+    off = np.abs(x - expected)
+    return (off <= part / 255 + rounding).all(axis=-1), (off <= part / 2 + rounding).all(axis=-1)
 
 
 def _light_cost(cells: Sequence[Row]) -> dict[str, Row]:

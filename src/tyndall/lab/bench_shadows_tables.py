@@ -225,8 +225,8 @@ def _chapter(document: Document) -> str:
     for label in _labels(document):
         what = document["techniques"][label]
         one, all_lights = (_cell(document, label, most=True, lights=count) for count in (first, last))
-        asked = [row for row in document.get("situations", ()) if row["technique"] == label and "equal" in row]
-        served = sum(row["equal"] >= SERVED for row in asked)
+        asked = [row for row in document.get("situations", ()) if row["technique"] == label and "right" in row]
+        served = sum(row["right"] >= SERVED for row in asked)
         refused = len({row["situation"] for row in _refused(document, "situations", label)})
         rows.append(
             [
@@ -245,7 +245,7 @@ def _chapter(document: Document) -> str:
         "S4 compares its techniques by complexity, usability, speed and quality, in words. Here *complexity* is the "
         "number of passes that a frame has for the shadows, lines of code that are neither blank nor comment (the "
         "technique's own, and of what it stands on), and parameters; *usability*, in how many of the situations below "
-        f"{_percent(SERVED)} of all pixels or more equal the truth; *speed*, GPU time of the whole frame; *quality*, "
+        f"{_percent(SERVED)} of all pixels or more are right; *speed*, GPU time of the whole frame; *quality*, "
         "relative RMSE against the truth."
     )
     parts = ["### S4's comparison", text, _table(heading, rows)]
@@ -257,7 +257,7 @@ def _chapter(document: Document) -> str:
 
 
 SERVED = 0.99
-"""The share of equal pixels from which on a technique serves a situation."""
+"""The share of right pixels from which on a technique serves a situation."""
 
 
 def _errors(document: Document) -> str:
@@ -266,8 +266,8 @@ def _errors(document: Document) -> str:
         "### Error against truth",
         f"Stills of {_times(document['settings']['error_size'])} against the traced truth, lit by one light that "
         "shines in all directions. *rel. RMSE* is of the surfaces' light, the truth's own noise taken off; *edges* is "
-        "the same near edges of shadows; *equal* is the share of pixels whose 8-bit values differ from the truth's by "
-        "one step at most, and *off edges* the same but near edges. Times are of this size.",
+        "the same near edges of shadows; *equal* is the share of pixels that are as lit or as shaded as in the truth, "
+        "to 1/255 of the light, and *off edges* the same but near edges. Times are of this size.",
     ]
     keys = dict.fromkeys((row["scene"], row["radius"]) for row in document["errors"])
     for scene, radius in keys:
@@ -361,17 +361,17 @@ def _situations(document: Document) -> str:
     text = (
         "One small scene a column: the lights `directional`, `spot` and `point` over flat floor and wall; receivers "
         "that are curved, that cast the shadow themselves (`itself`), or are seen from inside a shadow volume "
-        "(`inside`); casters that are an open sheet, or a texture with holes (`masked`). The share of pixels equal to "
-        "the truth; "
+        "(`inside`); casters that are an open sheet, or a texture with holes (`masked`). The share of pixels that "
+        "are nearer to the truth, lit or shaded, than to its opposite; "
         f"bold below {_percent(SERVED)}. For a `rect` light, which has a size, the relative RMSE."
     )
     return f"### What each technique serves\n\n{text}\n\n{_table(['technique', *names], body)}"
 
 
 def _served(row: Row) -> str:
-    if "equal" not in row:
+    if "right" not in row:
         return f"RMSE {_percent(row['rel_rmse'])}"
-    return _percent(row["equal"]) if row["equal"] >= SERVED else f"**{_percent(row['equal'])}**"
+    return _percent(row["right"]) if row["right"] >= SERVED else f"**{_percent(row['right'])}**"
 
 
 def _missing(title: str, rows: Sequence[Row]) -> str:
@@ -410,7 +410,7 @@ def _claim_spot(document: Document) -> list[str] | None:
     share = _share(document, "shadow_map", "point")
     if share is None:
         return None
-    text = f"under a point light {_percent(share)} of the pixels equal the truth (six maps a light)"
+    text = f"under a point light {_percent(share)} of the pixels are right (six maps a light)"
     return ["`shadow_map`", "for spot and directional lights only", text, _verdict(share < SERVED)]
 
 
@@ -438,9 +438,9 @@ def _claim_planes(document: Document) -> list[str] | None:
     if curved is None:
         if not _refused(document, "situations", "projective"):
             return None
-        text = f"{_percent(plane)} equal on planes; it refuses a curved receiver"
+        text = f"{_percent(plane)} right on planes; it refuses a curved receiver"
         return ["`projective`", "only for shadows on planes", text, "yes"]
-    text = f"{_percent(plane)} of pixels equal on planes, {_percent(curved)} with a curved receiver"
+    text = f"{_percent(plane)} of pixels right on planes, {_percent(curved)} with a curved receiver"
     return ["`projective`", "only for shadows on planes", text, _verdict(curved < plane)]
 
 
@@ -486,11 +486,11 @@ def _claim_anywhere(document: Document) -> list[str] | None:
     parts = []
     for label in _labels(document):
         if label.partition("/")[0] == "shadow_volume":
-            asked = [row for row in document.get("situations", ()) if row["technique"] == label and "equal" in row]
+            asked = [row for row in document.get("situations", ()) if row["technique"] == label and "right" in row]
             if asked:
-                worst = min(asked, key=lambda row: row["equal"])
+                worst = min(asked, key=lambda row: row["right"])
                 parts.append(
-                    (worst["equal"], f"`{label}` at worst {_percent(worst['equal'])} equal ({worst['situation']})")
+                    (worst["right"], f"`{label}` at worst {_percent(worst['right'])} right ({worst['situation']})")
                 )
     if not parts:
         return None
@@ -557,8 +557,8 @@ def _error(document: Document, label: str, soft: bool) -> float | None:
 
 def _share(document: Document, label: str, situation: str) -> float | None:
     for row in document.get("situations", ()):
-        if row["technique"] == label and row["situation"] == situation and "equal" in row:
-            return float(row["equal"])
+        if row["technique"] == label and row["situation"] == situation and "right" in row:
+            return float(row["right"])
     return None
 
 

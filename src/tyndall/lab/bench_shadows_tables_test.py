@@ -44,8 +44,8 @@ def error(technique: str, radius: float, rmse: float, equal: float | None = None
     return row if equal is None else {**row, "equal": equal, "equal_off_edges": equal + 0.0001}
 
 
-def situation(technique: str, name: str, equal: float) -> dict[str, Any]:
-    return {"technique": technique, "situation": name, "kind": "lights", "equal": equal, "rel_rmse": 1 - equal}
+def situation(technique: str, name: str, right: float) -> dict[str, Any]:
+    return {"technique": technique, "situation": name, "kind": "lights", "right": right, "rel_rmse": 1 - right}
 
 
 def described(lines: int) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -17,6 +18,7 @@ from tyndall.lab import bench_shadows
 from tyndall.lab.measure import wall_clock
 from tyndall.lab.picture import OutputError
 from tyndall.lab.shadow_situations import SITUATIONS
+from tyndall.scene import bundled
 from tyndall.scene.model import DirectionalLight, PointLight, Scene, SpotLight
 from tyndall.techniques.contract import Unsupported
 from tyndall.techniques.shadow import RayTraced, ShadowMap, ShadowVolume
@@ -181,6 +183,36 @@ def test_a_ball_gives_the_light_that_was_there() -> None:
     offset = np.array(far.position)
     assert far.intensity / (offset @ offset) == pytest.approx(3.0), "as bright in the middle of the scene"
     assert offset / np.linalg.norm(offset) == pytest.approx([0, 1, 0])
+
+
+def test_a_pixel_is_right_on_its_side_and_equal_at_its_end() -> None:
+    """One light of 1 over an ambient light of 0.25; the truth's albedo is a percent brighter than the frame's."""
+    unlit, full = np.full((1, 6, 3), 0.25), np.full((1, 6, 3), 1.25)
+    truth = 1.01 * np.array([1.25, 1.25, 1.25, 0.25, 0.25, 0.25])[None, :, None] * np.ones(3)
+    light = np.array([1.25, 0.80, 0.70, 0.25, 0.253, 0.80])[None, :, None] * np.ones(3)
+    equal, right = bench_shadows.agreement(light, truth, unlit, full)
+    assert equal.tolist() == [[True, False, False, True, True, False]]
+    assert right.tolist() == [[True, True, False, True, True, False]]
+    # What the light cannot reach has nothing to be wrong about.
+    equal, right = bench_shadows.agreement(unlit, truth, unlit, unlit)
+    assert equal.all()
+    assert right.all()
+
+
+def test_the_ball_hangs_free_in_the_interior() -> None:
+    """Light inside a surface is nobody's truth."""
+    scene = bench_shadows.lit_by_a_ball(bundled.SCENES["interior"](), 0.5, bench_shadows._PLACES["interior"])
+    (ball,) = scene.lights
+    assert isinstance(ball, PointLight)
+    rng = np.random.default_rng(3)
+    nearest = math.inf
+    for instance in scene.instances:
+        matrix = np.asarray(instance.transform)
+        corners = instance.mesh.positions @ matrix[:3, :3].T + matrix[:3, 3]
+        weights = rng.dirichlet((1, 1, 1), (200, len(instance.mesh.indices)))
+        points = np.einsum("stk,tkd->std", weights, corners[instance.mesh.indices])
+        nearest = min(nearest, float(np.linalg.norm(points - ball.position, axis=-1).min()))
+    assert nearest > ball.radius
 
 
 @pytest.mark.parametrize("name", SITUATIONS)
