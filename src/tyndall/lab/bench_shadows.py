@@ -613,7 +613,10 @@ class _Run:
             row = {**what, "status": "refused", "reason": str(reason)}
         except Exception as fault:  # whatever it is, the other figures are still wanted
             self.desk.close()
-            return {**what, "status": "failed", "reason": f"{type(fault).__name__}: {fault}".splitlines()[0]}
+            said = [text.strip() for text in str(fault).splitlines() if text.strip()]
+            # The first line of a driver's complaint says that there is one; the last says which.
+            reason = ": ".join(dict.fromkeys([type(fault).__name__, *said[:1], *said[-1:]]))
+            return {**what, "status": "failed", "reason": reason}
         self.kept.add(key, row)
         return row
 

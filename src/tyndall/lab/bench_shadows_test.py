@@ -123,7 +123,7 @@ def test_what_is_refused_or_fails_leaves_the_others(gpu: Gpu, monkeypatch: pytes
         raise Unsupported("two of them are too many")
 
     def fail(self: Any, *arguments: Any) -> Any:
-        raise GpuError("this one is too large\nand more")
+        raise GpuError("this one is too large\n  and so on\n  by a byte\n")
 
     labels = ("shadow_volume/zpass", "ray_traced", "shadow_map")
     small = replace(TINY, parts=("cells",), triangles=(10,), lights=(1,), techniques=labels)
@@ -133,7 +133,9 @@ def test_what_is_refused_or_fails_leaves_the_others(gpu: Gpu, monkeypatch: pytes
         document = bench_shadows.shadows(gpu, tmp_path, settings=small).to_json()
     where = {"part": "cells", "triangles": 10, "lights": 1}
     assert document["refused"] == [{**where, "technique": "shadow_volume/zpass", "reason": "two of them are too many"}]
-    assert document["failed"] == [{**where, "technique": "ray_traced", "reason": "GpuError: this one is too large"}]
+    assert document["failed"] == [
+        {**where, "technique": "ray_traced", "reason": "GpuError: this one is too large: by a byte"}
+    ]
     assert [row["technique"] for row in document["cells"]] == ["shadow_map"]
     # A fault is tried again, a refusal stands.
     later = bench_shadows.shadows(gpu, tmp_path, settings=small).to_json()
