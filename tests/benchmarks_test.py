@@ -29,3 +29,28 @@ def test_a_result_names_its_adapter_versions_and_scenes(path: Path) -> None:
     assert document["versions"]["tyndall"]
     hashes = [document["scene_hash"]] if "scene_hash" in document else [r["scene_hash"] for r in document["scenes"]]
     assert all(len(digest) == 64 for digest in hashes)
+
+
+def test_the_shadow_benchmark_and_its_peer_make_one_document(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """Without pygfx, which is no dependency, the document says so; with it, it has its cells."""
+    monkeypatch.syspath_prepend(ROOT / "benchmarks")
+    words = "--quick --parts cells --cells 10x1,20x2 --techniques shadow_map --frames 1 --seconds 0.1"
+    monkeypatch.setattr("sys.argv", ["shadows.py", *words.split(), "--out", str(tmp_path)])
+    runpy.run_path(str(ROOT / "benchmarks" / "shadows.py"), run_name="__main__")
+    document = json.loads(capsys.readouterr().out)
+    assert [(row["triangles"], row["lights"]) for row in document["cells"]] == [(10, 1), (20, 2)]
+    peer = document["peer"]
+    assert "failed" in peer or len(peer["cells"]) == 2
+    assert json.loads((tmp_path / "shadows.json").read_text(encoding="utf-8")) == document
+    assert "### Beside pygfx" in (tmp_path / "shadows.md").read_text(encoding="utf-8")
+
+
+def test_what_pygfx_is_given_is_the_same_light(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(ROOT / "benchmarks")
+    peer = runpy.run_path(str(ROOT / "benchmarks" / "peer_pygfx.py"))
+    assert peer["parse_cells"]("100000x5,10x1") == ((100_000, 5), (10, 1))
+    # sRGB's own fixed points, and its curve at middle grey.
+    assert peer["srgb"]((0.0, 1.0)) == pytest.approx((0.0, 1.0))
+    assert peer["srgb"]((0.2140,)) == pytest.approx((0.5,), abs=1e-3)

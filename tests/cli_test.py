@@ -20,7 +20,7 @@ from PIL import Image
 import tyndall
 from tyndall.app.cli import main
 from tyndall.gpu.params import fields_of
-from tyndall.lab import bench
+from tyndall.lab import bench, bench_shadows
 from tyndall.techniques import FAMILIES
 
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
@@ -241,6 +241,33 @@ def test_bench_writes_its_figures_as_json_and_as_tables(
     _, out, err = run(capsys, "bench", "volumetric", "--quick", "--out", "figures", "--json")
     assert json.loads(out) == kept
     assert "12 of 12 points were measured before" in err
+
+
+def test_bench_of_shadows_writes_its_figures_and_goes_on(
+    capsys: pytest.CaptureFixture[str], folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tiny = dataclasses.replace(
+        bench_shadows.QUICK,
+        parts=("cells",),
+        techniques=("shadow_map",),
+        size=(16, 12),
+        triangles=(10, 100),
+        lights=(1,),
+        frames=1,
+        warmup=0,
+    )
+    monkeypatch.setattr(bench_shadows, "QUICK", tiny)
+    code, out, err = run(capsys, "bench", "shadows", "--quick", "--out", "figures")
+    assert code == 0, err
+    assert "| `shadow_map` | 100 |" in out
+    assert {path.name for path in (folder / "figures").iterdir()} == {"shadows.json", "shadows.jsonl", "shadows.md"}
+    kept = json.loads((folder / "figures/shadows.json").read_text())
+    assert [row["triangles"] for row in kept["cells"]] == [10, 100]
+    _, out, err = run(capsys, "bench", "shadows", "--quick", "--out", "figures", "--json")
+    assert json.loads(out) == kept
+    assert "2 of 2 figures were measured before" in err
+    _, _, err = run(capsys, "bench", "shadows", "--quick", "--out", "figures", "--fresh")
+    assert "before" not in err
 
 
 def test_sweep_measures_what_flags_say_and_goes_on(capsys: pytest.CaptureFixture[str], folder: Path) -> None:

@@ -323,6 +323,33 @@ def volumetric(
         print(result.markdown())
 
 
+@bench.command()
+def shadows(
+    *,
+    quick: Annotated[bool, typer.Option("--quick", help="The same in small, for a software adapter.")] = False,
+    fresh: Annotated[bool, typer.Option("--fresh", help="Measure again what the folder already has.")] = False,
+    adapter: AdapterName = None,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the figures and the tables.")] = (
+        Path("out/shadows")
+    ),
+    as_json: Json = False,
+) -> None:
+    """Time, memory and error of every shadow technique, against triangles, lights and truth.
+
+    Stopped and started again, it goes on where it was.
+    """
+    from tyndall.lab import bench_shadows as figures
+
+    with console.Work("reading", remaining=True) as work:
+        result = figures.shadows(adapter, out, quick=quick, fresh=fresh, progress=work.advance)
+        for line in result.notes:
+            work.note(line)
+    if as_json:
+        print(json.dumps(result.to_json(), indent=2))
+    else:
+        print(result.markdown())
+
+
 def main(words: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code.
 

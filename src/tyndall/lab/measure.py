@@ -148,3 +148,35 @@ def measure(
         memory=renderer.memory(),
         frames=len(samples),
     )
+
+
+def wall_clock(
+    draw: Callable[[], object],
+    wait: Callable[[], object],
+    *,
+    frames: int = 64,
+    warmup: int = 2,
+    budget_s: float | None = None,
+) -> Times:
+    """Milliseconds that whole frames take by the clock, from the call of ``draw`` until ``wait`` says that it is drawn.
+
+    Host and device are both in it, one after the other: the time after which a picture is there. With ``budget_s`` it
+    stops early, after at least two frames.
+
+    Raises:
+        ParameterError: fewer than one frame.
+    """
+    if frames < 1:
+        raise ParameterError(f"frames: {frames} is fewer than 1")
+    start = time.monotonic()
+    samples: list[float] = []
+    for index in range(warmup + frames):
+        begin = time.perf_counter()
+        draw()
+        wait()
+        taken = (time.perf_counter() - begin) * 1e3
+        if index >= warmup:
+            samples.append(taken)
+        if budget_s and len(samples) >= 2 and time.monotonic() - start > budget_s:
+            break
+    return Times.of(samples)
