@@ -615,8 +615,8 @@ class _Run:
             self.desk.close()
             said = [text.strip() for text in str(fault).splitlines() if text.strip()]
             # The first line of a driver's complaint says that there is one; the last says which.
-            reason = ": ".join(dict.fromkeys([type(fault).__name__, *said[:1], *said[-1:]]))
-            return {**what, "status": "failed", "reason": reason}
+            told = ": ".join(dict.fromkeys([type(fault).__name__, *said[:1], *said[-1:]]))
+            return {**what, "status": "failed", "reason": told}
         self.kept.add(key, row)
         return row
 
