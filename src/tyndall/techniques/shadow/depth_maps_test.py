@@ -17,6 +17,7 @@ from tyndall.techniques.shadow.esm import Esm
 from tyndall.techniques.shadow.evsm import Evsm
 from tyndall.techniques.shadow.pcf import Pcf
 from tyndall.techniques.shadow.pcss import Pcss
+from tyndall.techniques.shadow.ray_traced import RayTraced
 from tyndall.techniques.shadow.shadow_map import ShadowMap
 from tyndall.techniques.shadow.vsm import Vsm
 from tyndall.techniques.volumetric.march import March
@@ -31,7 +32,7 @@ CUBE = props.box((-0.5, 0.4, -0.5), (0.5, 1.4, 0.5))
 LANE = Scene(
     [
         props.floor(0, 40),
-        *(props.box((x, 0, z), (x + 0.1, 1, z + 0.1)) for x in (-1.0, 0.9) for z in np.arange(-30.0, 2.0, 2.0)),
+        *(props.box((x, 0, z), (x + 0.3, 1, z + 0.3)) for x in (-1.0, 0.7) for z in np.arange(-30.0, 2.0, 2.0)),
     ],
     [DirectionalLight((0.6, -1.0, 0.3), 3.0)],
     Camera((0, 1.5, 5), (0, 0.3, -3), fov=0.8, near=0.05),
@@ -66,7 +67,7 @@ def test_a_plane_in_full_light_loses_nothing(gpu: Gpu, cls: type[DepthMaps], cas
         Pcf(size=256, radius=1e-4),
         Pcss(size=256, min_radius=0),
         Vsm(size=256, radius=0, bleeding=0.5),
-        Esm(size=256, radius=0, exponent=20_000),
+        Esm(size=256, radius=0, exponent=16),
         Evsm(size=256, radius=0, bleeding=0.5),
     ],
     ids=lambda t: f"{t.name}",
@@ -88,7 +89,7 @@ def test_without_a_radius_all_are_the_shadow_map(gpu: Gpu, technique: DepthMaps,
 
 @pytest.mark.parametrize("cls", [Pcf, Vsm, Esm, Evsm])
 def test_a_wider_radius_makes_wider_edges(gpu: Gpu, cls: type[DepthMaps]) -> None:
-    scene = Scene([props.floor(0, 4), CUBE], [SUN], ABOVE)
+    scene = Scene([props.floor(0, 4), CUBE], [DirectionalLight((0, -1, 0), 3.0)], ABOVE)
     between = []
     for radius in (0.5, 4.0, 12.0):
         seen = props.shade(gpu, scene, cls(size=256, radius=radius), SIZE, frames=2)  # type: ignore[call-arg]
@@ -97,7 +98,11 @@ def test_a_wider_radius_makes_wider_edges(gpu: Gpu, cls: type[DepthMaps]) -> Non
     assert between[2] > 1.5 * between[1]
 
 
-@pytest.mark.parametrize("technique", [Vsm(size=128, radius=12), Esm(size=128, radius=12), Evsm(size=128, radius=12)])
+@pytest.mark.parametrize(
+    "technique",
+    [Vsm(size=128, radius=12), Esm(size=128, radius=12, exponent=0.05), Evsm(size=128, radius=12)],
+    ids=lambda t: f"{t.name}",
+)
 def test_a_wide_blur_shows_no_seam_of_the_cube(gpu: Gpu, technique: DepthMaps) -> None:
     """Down the middle of a face's edge, where the light at 45° meets the floor, visibility does not jump."""
     light = PointLight((0, 2, 0), 20.0)
@@ -106,11 +111,11 @@ def test_a_wide_blur_shows_no_seam_of_the_cube(gpu: Gpu, technique: DepthMaps) -
     scene = Scene([props.floor(0, 4), bar], [light], camera)
     seen = props.shade(gpu, scene, technique, (96, 72))
     assert seen.min() < 0.5
-    flat = np.isfinite(props.cast(scene, camera.position, props.rays(camera, (96, 72)).directions).distance)
-    jump = np.abs(np.diff(seen, axis=1))[flat[:, 1:]]
-    assert jump.max() < 0.2
-    with_bar = np.abs(np.diff(props.shade(gpu, scene, ShadowMap(size=128), (96, 72)), axis=1)).max()
-    assert with_bar > 0.5, "without the blur it would"
+    floor = props.cast(scene, camera.position, props.rays(camera, (96, 72)).directions).instance == 0
+    both = floor[:, 1:] & floor[:, :-1]
+    assert np.abs(np.diff(seen, axis=1))[both].max() < 0.3
+    hard = props.shade(gpu, scene, ShadowMap(size=128), (96, 72))
+    assert np.abs(np.diff(hard, axis=1))[both].max() > 0.5, "without the blur it would"
 
 
 # --- finer maps ---------------------------------------------------------------------------------------------------
@@ -164,7 +169,7 @@ def test_finer_maps_are_finer_and_as_deep_as_the_scene() -> None:
     layers = finer_layers(LANE, LANE.camera, 1.5, 256, 2, 4, 0.7)
     widths = [layer.texel for layer in (*layers, base)]
     assert widths == sorted(widths)
-    assert widths[0] < 0.1 * widths[-1]
+    assert widths[0] < 0.2 * widths[-1]
     corners = np.c_[box_corners(*LANE.bounds), np.ones(8)]
     for layer in layers:
         depth = (layer.matrix @ corners.T)[2]
@@ -174,13 +179,14 @@ def test_finer_maps_are_finer_and_as_deep_as_the_scene() -> None:
 
 
 def test_finer_maps_sharpen_what_is_near(gpu: Gpu) -> None:
-    seen = props.rays(LANE.camera, SIZE)
+    size = (96, 72)
+    seen = props.rays(LANE.camera, size)
     hit = props.cast(LANE, seen.origin, seen.directions)
     floor = hit.instance == 0
     truth = props.lit(LANE, LANE.lights[0], seen.at(np.where(floor, hit.distance, 1)))
     assert (~truth & floor).sum() > 50
     wrong = [
-        np.abs(props.shade(gpu, LANE, ShadowMap(size=256, cascades=cascades), SIZE) - truth)[floor].mean()
+        np.abs(props.shade(gpu, LANE, ShadowMap(size=256, cascades=cascades), size) - truth)[floor].mean()
         for cascades in (0, 2, 4)
     ]
     assert wrong[1] < 0.6 * wrong[0]
@@ -190,16 +196,17 @@ def test_finer_maps_sharpen_what_is_near(gpu: Gpu) -> None:
 @pytest.mark.parametrize("cls", ALL)
 def test_maps_take_over_from_each_other_without_a_line(gpu: Gpu, cls: type[DepthMaps]) -> None:
     """A shadow that runs through all maps is dark throughout, and nothing beside it is."""
-    beam = props.box((-0.5, 1.2, -38), (0.5, 1.3, 38))
-    scene = replace(LANE, instances=[props.floor(0, 40), beam], lights=[DirectionalLight((0.1, -1, 0.05), 3.0)])
+    beam = props.box((-1.5, 1.2, -38), (1.5, 1.3, 38))
+    camera = Camera((8, 2.5, 8), (0, 0, -6), fov=0.8, near=0.05)
+    scene = Scene([props.floor(0, 40), beam], [DirectionalLight((0.1, -1, 0.05), 3.0)], camera)
     size = (48, 64)
     seen = props.rays(scene.camera, size)
     hit = props.cast(scene, seen.origin, seen.directions)
     points = seen.at(np.where(hit.instance == 0, hit.distance, 1))
     shade = props.shade(gpu, scene, cls(size=512, cascades=3), size)
     shift = 0.1 * 1.25
-    inside = (hit.instance == 0) & (np.abs(points[..., 0] - shift) < 0.25) & (np.abs(points[..., 2]) < 36)
-    outside = (hit.instance == 0) & (np.abs(points[..., 0] - shift) > 1.2)
+    inside = (hit.instance == 0) & (np.abs(points[..., 0] - shift) < 0.6) & (np.abs(points[..., 2]) < 36)
+    outside = (hit.instance == 0) & (np.abs(points[..., 0] - shift) > 2.5)
     assert np.ptp(points[inside][:, 2]) > 10
     assert shade[inside].max() < 0.03
     assert shade[outside].min() > 0.97
@@ -218,20 +225,23 @@ def test_the_frames_own_camera_places_them(gpu: Gpu) -> None:
         np.testing.assert_array_equal(moved, renderer.base())
 
 
-@pytest.mark.parametrize("volumetric", [March(steps=32, jitter=0), "polygonal"], ids=["march", "polygonal"])
-def test_the_air_is_shaded_everywhere(gpu: Gpu, volumetric: March | str) -> None:
-    """Behind the camera, and beside what it sees, there are no finer maps; the scene's own is read as ever."""
+def test_the_air_is_shaded_everywhere(gpu: Gpu) -> None:
+    """Finer maps sharpen shafts where they are; behind the camera, and beside what it sees, the scene's own is read."""
     medium = Medium(0.05, 0.01, bounds=((-6, -6, -8), (6, 6, 3)))
     camera = Camera((0.4, 0.3, 1.5), (0, 0, -4), fov=0.9, near=0.05)
     shapes = [*props.slits(-3, 3, 0.5, 3), props.floor(-1.5, 9)]
     scene = Scene(shapes, [DirectionalLight((0.3, -0.1, 1.0), 5.0)], camera, medium)
-    plain, finer = (
-        props.shoot(
-            gpu, scene, (24, 18), volumetric=volumetric, shadow=ShadowMap(size=1024, cascades=count)
-        ).inscattered
-        for count in (0, 3)
+    march = March(steps=64, jitter=0)
+    rays, plain, finer = (
+        props.shoot(gpu, scene, (24, 18), volumetric=march, shadow=shadow).inscattered
+        for shadow in (RayTraced(), ShadowMap(size=1024), ShadowMap(size=1024, cascades=3))
     )
-    assert props.difference(finer, plain) < (0.03 if isinstance(volumetric, March) else 1e-6)
+    assert props.difference(finer, rays) < 0.5 * props.difference(plain, rays)
+    walked = [
+        props.shoot(gpu, scene, (24, 18), volumetric="polygonal", shadow=ShadowMap(size=256, cascades=count)).inscattered
+        for count in (0, 3)
+    ]
+    np.testing.assert_array_equal(walked[0], walked[1], err_msg="what walks the maps walks the scene's own")
 
 
 # --- drawn by compute passes --------------------------------------------------------------------------------------
