@@ -533,3 +533,16 @@ def shade(
             renderer.draw(camera)
             got += renderer.base()[..., 0] / frames
     return np.where(full > 0, got / np.where(full > 0, full, 1), 1)
+
+
+def sheet_edge(light: Light, height: float, half: float = 3.0, edge: float = 0.0) -> Scene:
+    """A wall at z = −3 before :data:`AHEAD`, and a sheet ``height`` metres above it, over all x < ``edge``."""
+    z = height - 3
+    sheet = quad((-half, -half, z), (edge, -half, z), (edge, half, z), (-half, half, z))
+    return Scene([wall(-3, half), sheet], [light], AHEAD)
+
+
+def disk_part(x: ArrayLike) -> Floats:
+    """The part of a unit disk on the near side of a line at x, −1 … 1: what a straight edge leaves of a round light."""
+    s = np.clip(np.asarray(x, float), -1, 1)
+    return (np.arccos(-s) + s * np.sqrt(1 - s * s)) / np.pi

@@ -51,12 +51,17 @@ if TYPE_CHECKING:
     from tyndall.techniques.occlusion import NoOcclusion, RayTracedAo
     from tyndall.techniques.shadow import (
         Blurred,
+        Esm,
+        Evsm,
+        Pcf,
+        Pcss,
         PenumbraWedge,
         Planar,
         Projective,
         RayTraced,
         ShadowMap,
         ShadowVolume,
+        Vsm,
     )
     from tyndall.techniques.tonemap import Aces, Agx, Clip
     from tyndall.techniques.volumetric import Froxel, March, Off, Polygonal, ScreenSpace
@@ -71,6 +76,8 @@ __all__ = [
     "Clip",
     "Comparison",
     "DirectionalLight",
+    "Esm",
+    "Evsm",
     "Froxel",
     "Gibbons",
     "GpuError",
@@ -86,6 +93,8 @@ __all__ = [
     "NoOcclusion",
     "Off",
     "ParameterError",
+    "Pcf",
+    "Pcss",
     "PenumbraWedge",
     "Picture",
     "Planar",
@@ -110,6 +119,7 @@ __all__ = [
     "Texture",
     "Truth",
     "TruthSettings",
+    "Vsm",
     "__version__",
     "compare",
     "load",

@@ -246,7 +246,7 @@ def test_a_light_with_a_radius_is_hidden_whole_or_not_at_all(gpu: Gpu, name: str
     # The parts are the rim and beyond; the map's texels are left to the other tests.
     assert (visible[all_of_it] > 0.97).mean() > 0.995
     if name == "pcss":
-        # The map shows the top of the cube alone, whose penumbra is wider than that of the bottom, where the umbra ends.
+        # The map shows the top of the cube alone, whose penumbra is wider than the bottom's, where the umbra ends.
         assert visible[none_of_it].mean() < 0.12
     else:
         assert (visible[none_of_it] < 0.03).mean() > 0.98

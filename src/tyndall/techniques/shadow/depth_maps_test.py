@@ -238,7 +238,9 @@ def test_the_air_is_shaded_everywhere(gpu: Gpu) -> None:
     )
     assert props.difference(finer, rays) < 0.5 * props.difference(plain, rays)
     walked = [
-        props.shoot(gpu, scene, (24, 18), volumetric="polygonal", shadow=ShadowMap(size=256, cascades=count)).inscattered
+        props.shoot(
+            gpu, scene, (24, 18), volumetric="polygonal", shadow=ShadowMap(size=256, cascades=count)
+        ).inscattered
         for count in (0, 3)
     ]
     np.testing.assert_array_equal(walked[0], walked[1], err_msg="what walks the maps walks the scene's own")

@@ -5,13 +5,13 @@ larger ``c`` is; and it is a product of a part for the place and one for the tex
 latter may be blurred: ``V = min(1, e^(−c·z)·mean e^(c·b))``. One number a texel is kept. Close behind a caster, within
 about ``1/c``, its shadow is too light; and where a blur reaches past an edge to something far behind the place, too.
 
-``c`` is ``exponent`` over a texel's width (half-way through a perspective map's reach), so that the shadow is as dark so
-many texels behind a caster at any scale. The paper's c over the whole reach is limited to 88 by the range of a 32-bit
-float. Here the *logarithm* of the mean is kept, ``ln(mean e^(c·b))/c``, a depth again, and every sum is taken relative
-to its largest term, so that any ``c`` does. Texels are interpolated as exponentials, too.
+``c`` is ``exponent`` over a texel's width (half-way through a perspective map's reach), so that the shadow is as dark
+so many texels behind a caster at any scale. The paper's c over the whole reach is limited to 88 by the range of a
+32-bit float. Here the *logarithm* of the mean is kept, ``ln(mean e^(c·b))/c``, a depth again, and every sum is taken
+relative to its largest term, so that any ``c`` does. Texels are interpolated as exponentials, too.
 
-A plane needs hardly any bias, as the mean of its exponentials is above the exponential of their mean; and bias multiplies
-what is lit by ``e^(c·bias)``, which narrows shadows. So the bias is less than a shadow map's.
+A plane needs hardly any bias, as the mean of its exponentials is above the exponential of their mean; and bias
+multiplies what is lit by ``e^(c·bias)``, which narrows shadows. So the bias is less than a shadow map's.
 """
 
 from __future__ import annotations

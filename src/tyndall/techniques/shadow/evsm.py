@@ -1,9 +1,9 @@
 """Exponential variance shadow maps (Lauritzen and McCool 2008).
 
-A variance shadow map (:mod:`tyndall.techniques.shadow.vsm`) of a warped depth: ``e^(c·z)``, with z from −1 to 1, spreads
-what is near the receiver and presses together what is far before it, so that overlapping casters are one to Chebyshev's
-inequality and hardly bleed. A second bound, of ``−e^(−c·z)``, is loose where the first is tight; the smaller of both is
-taken. Four moments a texel are kept.
+A variance shadow map (:mod:`tyndall.techniques.shadow.vsm`) of a warped depth: ``e^(c·z)``, with z from −1 to 1,
+spreads what is near the receiver and presses together what is far before it, so that overlapping casters are one to
+Chebyshev's inequality and hardly bleed. A second bound, of ``−e^(−c·z)``, is loose where the first is tight; the
+smaller of both is taken. Four moments a texel are kept.
 
 Squares of the exponential must fit a 32-bit float, which holds c below 44; ``positive`` and ``negative`` end at 42. The
 least variance is given in texels of depth and warped with it.

@@ -6,8 +6,8 @@ weights their answers. Edges become smooth over about ``radius`` texels, everywh
 penumbra.
 
 The places lie on a disk across the light's rays in a golden-angle spiral (Vogel 1979), turned by another angle in each
-pixel and frame, so that too few of them make noise and no bands. Unlike in the paper, they are not places of the map but
-of the receiver's plane, each brought back to the map: the plane is then compared with its own depth everywhere, and
+pixel and frame, so that too few of them make noise and no bands. Unlike in the paper, they are not places of the map
+but of the receiver's plane, each brought back to the map: the plane is then compared with its own depth everywhere, and
 shades itself at no radius; and around a point light each place finds its own face of the cube, so that no seam shows.
 """
 

@@ -9,8 +9,9 @@ angular diameter. So the disk is the light's own image through the caster, and b
 the visibility is exactly the part of the light's disk that is seen.
 
 What differs from the paper: the light's size is that of the scene's light, in metres or radians, not a parameter; a
-sphere is the disk that hides the same cone, ``r/√(1 − r²/d²)``; blockers count only where they stand in the cone between
-the place and the light, so that what is beside it does not widen the penumbra; and disks lie on the receiver's plane.
+sphere is the disk that hides the same cone, ``r/√(1 − r²/d²)``; blockers count only where they stand in the cone
+between the place and the light, so that what is beside it does not widen the penumbra; and disks lie on the receiver's
+plane.
 
 The map shows only what is nearest to the light, and all blockers are taken for one at their mean: where casters overlap
 the penumbra is too narrow or too wide. Blockers are searched as far around as any caster in the scene's box could

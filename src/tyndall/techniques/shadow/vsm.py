@@ -1,9 +1,9 @@
 """Variance shadow maps (Donnelly and Lauritzen 2006).
 
-The mean and the mean square of the depth around a place give its variance, and Chebyshev's inequality bounds the part of
-the texels that lie beyond the place: ``V ≤ σ²/(σ² + (z − μ)²)`` where ``z > μ``, 1 else. For one flat caster over one
-flat receiver the bound is the answer. Where casters overlap at different depths it is not, and light bleeds into the
-shadow; ``bleeding`` cuts off what is below it and makes edges harder for that.
+The mean and the mean square of the depth around a place give its variance, and Chebyshev's inequality bounds the part
+of the texels that lie beyond the place: ``V ≤ σ²/(σ² + (z − μ)²)`` where ``z > μ``, 1 else. For one flat caster over
+one flat receiver the bound is the answer. Where casters overlap at different depths it is not, and light bleeds into
+the shadow; ``bleeding`` cuts off what is below it and makes edges harder for that.
 
 Unlike in the paper the variance is not raised by the slope of the receiver: the same bias as a shadow map's moves the
 place towards the light. Depths are kept relative to the middle of the map's reach, which spares two bits of the square.
