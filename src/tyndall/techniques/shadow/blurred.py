@@ -57,7 +57,9 @@ class Blurred(Technique):
             for label in ("shade", "across")
         )
         size = (*view.size, groups)
-        view.compute("black_white").bind(drawn.bindings, shade_out=shade.write()).dispatch(*size)
+        answers = view.compute("black_white").overlay(drawn.overlay)
+        answers.bind(drawn.bindings, shade_out=shade.write()).dispatch(*size)
         view.compute("blur_across").bind(shade_images=shade, shade_out=across.write()).dispatch(*size)
         view.compute("blur_down").bind(shade_images=across, shade_out=shade.write()).dispatch(*size)
-        return Visibility(drawn.module, self.shader(), {**drawn.bindings, "shade_images": shade}, drawn.maps)
+        bindings = {**drawn.bindings, "shade_images": shade}
+        return Visibility(drawn.module, self.shader(), bindings, drawn.maps, drawn.overlay)
