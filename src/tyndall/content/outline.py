@@ -9,7 +9,8 @@ triangles. What real meshes look like is taken care of here, once for each mesh:
   2008, *Shadow volumes for non-manifold surfaces*), and a sum may be split.
 - **Closed parts are told from open ones.** A part, triangles connected by edges, is closed if each of its edges has two
   triangles that run along it in opposite directions. Of a closed part the triangles that face the light are enough; an
-  open one casts with both sides, and each of its triangles must count.
+  open one casts with both sides, and each of its triangles must count. So does a closed one that is wound inside out,
+  as rooms are that are seen from within only: the triangles that face the light are its far ones.
 - **Triangles with two equal corners** have no area and no say. Those with three corners on a line keep their place
   between their neighbours.
 """
@@ -28,6 +29,7 @@ from tyndall.scene.model import DirectionalLight, Light, Mesh, box_corners
 
 _PART = "package::content::outline::OutlinePart"
 NONE = 0x7FFFFFFF  # in place of a triangle, as outline.wesl has it
+_TOUCHING = 4e-6  # of the coordinates' size: a light that is so near to a triangle is in it; see silhouettes.wesl
 SAME_WAY = 1 << 31  # the second triangle runs along the edge as the first one does
 
 
@@ -38,7 +40,7 @@ class Adjacency:
     Attributes:
         edges: (E, 4) uint32: two vertices, the triangle that runs from the first to the second, and another or
             :data:`NONE`, which runs back unless :data:`SAME_WAY` is set.
-        closed: (T,) whether a triangle is of a closed part.
+        closed: (T,) whether a triangle is of a closed part that is wound outwards.
         part: (T,) int64, a number for each connected part.
     """
 
@@ -82,7 +84,15 @@ class Adjacency:
         open_parts[part[triangle[order[~sound[edge]]]]] = True
         closed = ~open_parts[part]
         closed[np.setdiff1d(np.arange(count), whole)] = False
+        closed &= _volumes(mesh, part)[part] >= 0
         return cls(edges, closed, part)
+
+
+def _volumes(mesh: Mesh, part: NDArray[np.int64]) -> NDArray[np.float64]:
+    """By a part's number, six times the volume that it encloses; below 0 where it is wound inside out."""
+    middle = 0.5 * (mesh.bounds[0].astype(np.float64) + mesh.bounds[1])
+    a, b, c = (mesh.positions[mesh.indices[:, i]] - middle for i in range(3))
+    return np.bincount(part, weights=np.einsum("ij,ij->i", a, np.cross(b, c)))
 
 
 def welded(positions: NDArray[np.float32]) -> NDArray[np.int64]:
@@ -120,6 +130,17 @@ def _connected(count: int, a: NDArray[np.int64], b: NDArray[np.int64]) -> NDArra
         np.minimum.at(label, np.maximum(one, other), np.minimum(one, other))
         while (shorter := label[label]).tobytes() != label.tobytes():
             label = shorter
+
+
+def _any_touches(a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64], near: float) -> bool:
+    """Whether the origin lies in one of the triangles of corners (T, 3), to a distance."""
+    normal = np.cross(b - a, c - a)
+    size = np.linalg.norm(normal, axis=1)
+    touched = (np.abs(np.einsum("ij,ij->i", normal, a)) <= near * size) & (size > 0)
+    for start, stop in ((a, b), (b, c), (c, a)):
+        along = np.einsum("ij,ij->i", np.cross(start, stop), normal)
+        touched &= along >= -near * size * np.linalg.norm(stop - start, axis=1)
+    return bool(touched.any())
 
 
 @dataclass(frozen=True)
@@ -193,10 +214,11 @@ class Outline:
         }
 
     def is_inside(self, light: Light) -> list[bool]:
-        """For each placement, whether a light is inside one of its closed parts: then what faces away from it casts.
+        """For each placement, whether a light is inside one of its closed parts, or in its surface: then what faces away
+        from it casts.
 
         The sum of the solid angles of a part's triangles, as the light sees them, is 4π inside and 0 outside (van
-        Oosterom and Strackee 1983).
+        Oosterom and Strackee 1983). In the surface it is anything between.
         """
         if isinstance(light, DirectionalLight):
             return [False] * self.parts
@@ -206,7 +228,9 @@ class Outline:
         adjacency = self._found[id(p.mesh)]
         low, high = (corner.astype(np.float64) for corner in p.mesh.bounds)
         corners = box_corners(low, high) @ p.transform[:3, :3].T + p.transform[:3, 3]
-        if not adjacency.closed.any() or (point < corners.min(axis=0)).any() or (point > corners.max(axis=0)).any():
+        near = _TOUCHING * max(np.linalg.norm(point), np.linalg.norm(corners, axis=1).max())
+        beside = (point < corners.min(axis=0) - near).any() or (point > corners.max(axis=0) + near).any()
+        if beside or not adjacency.closed.any():
             return False
         world = p.mesh.positions.astype(np.float64) @ p.transform[:3, :3].T + p.transform[:3, 3] - point
         a, b, c = np.moveaxis(world[p.mesh.indices[adjacency.closed]], 1, 0)
@@ -215,7 +239,7 @@ class Outline:
         dots = [np.einsum("ij,ij->i", u, v) for u, v in ((a, b), (b, c), (c, a))]
         angle = 2 * np.arctan2(volume, la * lb * lc + dots[0] * lc + dots[1] * la + dots[2] * lb)
         turns = np.bincount(adjacency.part[adjacency.closed], weights=angle) / (4 * np.pi)
-        return bool((np.abs(turns) > 0.25).any())
+        return bool((np.abs(turns) > 0.25).any()) or _any_touches(a, b, c, near)
 
     def resources(self) -> list[Resource]:
         """What it holds on the device."""
