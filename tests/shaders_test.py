@@ -26,6 +26,7 @@ from tyndall.scene.model import (
 )
 from tyndall.techniques import FAMILIES
 from tyndall.techniques.contract import Unsupported
+from tyndall.techniques.shadow.depth_maps import IN_WORDS
 from tyndall.tracing.cast import blocked, cast
 from tyndall.tracing.world import World
 
@@ -120,6 +121,7 @@ def test_every_module_is_imported_or_has_an_entry_point(gpu: Gpu) -> None:
     texts = {m: t for m, t in gpu.linker.modules.items() if not m.startswith("package::test_")}
     roots = {module for module, _ in entry_points(gpu)}
     overlaid = {cls.shader() for family in ("shadow", "occlusion") for cls in FAMILIES[family].members.values()}
+    overlaid |= set(IN_WORDS.values())
     for module in texts.keys() - roots - overlaid:
         users = [m for m, text in texts.items() if re.search(rf"import {module}\b", text)]
         assert users, f"{module} is imported nowhere"

@@ -229,6 +229,8 @@ class Renderer(Closing):
             self._record(camera or self.scene.camera, jitter, casters)
         except BaseException:
             self.gpu.discard()  # half a frame must not precede the next one
+            for view in self._views.values():
+                view.forget()
             raise
         self.gpu.submit()
         self._frame += 1

@@ -185,6 +185,7 @@ def test_a_frame_that_fails_leaves_nothing_behind(gpu: Gpu, monkeypatch: pytest.
     with Renderer(scene, TINY, gpu=gpu, volumetric="off", shadow=ShadowMap(size=64)) as renderer:
         renderer.draw()
         passes = [label for label, _ in gpu.timings()]
+        assert "volumetric.off.clear" in passes
 
         def interrupted(*_: object) -> None:
             raise KeyboardInterrupt

@@ -375,7 +375,7 @@ def _features(material: Material) -> dict[str, bool]:
     maps = {f"has_{name}": getattr(material, f"{name}_texture") is not None for name in MAPS}
     return {
         **maps,
-        "is_textured": any(maps.values()),
+        "is_textured": any(maps.values()) or material.alpha_mode == "mask",
         "is_masked": material.alpha_mode == "mask",
         "is_two_sided": material.double_sided,
     }

@@ -193,6 +193,12 @@ class View:
         made.camera, made.maps_wanted, made.air_wanted = self.camera, self.maps_wanted, self.air_wanted
         return made
 
+    def forget(self) -> None:
+        """Make anew what was kept: what a discarded frame recorded did not happen."""
+        self._kept.clear()
+        for part in self._parts.values():
+            part.forget()
+
     def resources(self) -> list[Resource]:
         """What the technique holds on the device."""
         own = [*self._resources.values(), *([self._params] if self._params else [])]
