@@ -26,6 +26,8 @@ from tyndall.scene.model import (
 )
 from tyndall.techniques import FAMILIES
 from tyndall.techniques.contract import Unsupported
+from tyndall.techniques.shadow.depth_maps import IN_WORDS
+from tyndall.techniques.shadow.shadow_map import ShadowMap
 from tyndall.tracing.cast import blocked, cast
 from tyndall.tracing.world import World
 
@@ -88,6 +90,9 @@ def test_every_entry_point_compiles_and_is_used(gpu: Gpu, monkeypatch: pytest.Mo
                 renderer.use(family, start[family])
             assert (renderer.depth() > 0).all()
     assert drawn >= 2 * 10
+    solid = Scene(SHAPES[:2], LIGHTS[:1], props.AHEAD)  # maps of what has holes are not drawn in compute
+    with Renderer(solid, (8, 6), gpu=gpu, shadow=ShadowMap(size=64, rasterizer="compute")) as renderer:
+        renderer.draw()
     for depth in (2, 3):
         trace(scene, (8, 6), TruthSettings(target=1, depth=depth), gpu=gpu, cache=False)
     with World(gpu, scene, movable=True) as world:
@@ -120,6 +125,7 @@ def test_every_module_is_imported_or_has_an_entry_point(gpu: Gpu) -> None:
     texts = {m: t for m, t in gpu.linker.modules.items() if not m.startswith("package::test_")}
     roots = {module for module, _ in entry_points(gpu)}
     overlaid = {cls.shader() for family in ("shadow", "occlusion") for cls in FAMILIES[family].members.values()}
+    overlaid |= set(IN_WORDS.values())
     for module in texts.keys() - roots - overlaid:
         users = [m for m, text in texts.items() if re.search(rf"import {module}\b", text)]
         assert users, f"{module} is imported nowhere"
