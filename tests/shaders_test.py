@@ -27,6 +27,7 @@ from tyndall.scene.model import (
 from tyndall.techniques import FAMILIES
 from tyndall.techniques.contract import Unsupported
 from tyndall.techniques.shadow.depth_maps import IN_WORDS
+from tyndall.techniques.shadow.shadow_map import ShadowMap
 from tyndall.tracing.cast import blocked, cast
 from tyndall.tracing.world import World
 
@@ -89,6 +90,9 @@ def test_every_entry_point_compiles_and_is_used(gpu: Gpu, monkeypatch: pytest.Mo
                 renderer.use(family, start[family])
             assert (renderer.depth() > 0).all()
     assert drawn >= 2 * 10
+    solid = Scene(SHAPES[:2], LIGHTS[:1], props.AHEAD)  # maps of what has holes are not drawn in compute
+    with Renderer(solid, (8, 6), gpu=gpu, shadow=ShadowMap(size=64, rasterizer="compute")) as renderer:
+        renderer.draw()
     for depth in (2, 3):
         trace(scene, (8, 6), TruthSettings(target=1, depth=depth), gpu=gpu, cache=False)
     with World(gpu, scene, movable=True) as world:

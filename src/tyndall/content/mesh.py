@@ -373,10 +373,11 @@ def _centred(mesh: Mesh) -> NDArray[np.float32]:
 def _features(material: Material) -> dict[str, bool]:
     """What a material's shader must do: a fragment of a plain one is several times as cheap."""
     maps = {f"has_{name}": getattr(material, f"{name}_texture") is not None for name in MAPS}
+    masked = material.alpha_mode == "mask"
     return {
         **maps,
-        "is_textured": any(maps.values()) or material.alpha_mode == "mask",
-        "is_masked": material.alpha_mode == "mask",
+        "is_textured": masked or any(maps.values()),  # holes are looked up, if only in a white texel
+        "is_masked": masked,
         "is_two_sided": material.double_sided,
     }
 

@@ -126,6 +126,18 @@ def test_holes(gpu: Gpu, mode: Any, cutoff: float) -> None:
     np.testing.assert_allclose(shot.depth[on], np.where(hole, 6, 4)[on], rtol=1e-4)
 
 
+@pytest.mark.parametrize("alpha", [0.8, 0.2])
+def test_a_mask_without_a_texture_is_there_or_is_not(gpu: Gpu, alpha: float) -> None:
+    """For the eye and for the light: behind a mask that is all hole, the wall is lit."""
+    material = replace(WHITE, alpha_mode="mask", alpha_cutoff=0.5, base_color=(1, 1, 1, alpha))
+    behind = props.wall(-6)
+    shot = shoot(gpu, Scene([textured(material), behind], [SUN], AHEAD), SIZE)
+    bare = shoot(gpu, Scene([behind] if alpha < 0.5 else [textured(WHITE), behind], [SUN], AHEAD), SIZE)
+    np.testing.assert_allclose(shot.depth, bare.depth, rtol=1e-4)
+    np.testing.assert_allclose(shot.base, bare.base, atol=1e-3)
+    assert bare.base.max() > 0.1
+
+
 def test_a_flat_normal_map_changes_nothing(gpu: Gpu) -> None:
     """(128, 128, 255) is not quite (0, 0, 1): 1/255 off in both directions."""
     flat = Texture(Image(np.full((2, 2, 4), (128, 128, 255, 255), np.uint8)))
