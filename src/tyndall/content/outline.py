@@ -214,7 +214,7 @@ class Outline:
         }
 
     def is_inside(self, light: Light) -> list[bool]:
-        """For each placement, whether a light is inside one of its closed parts, or in its surface: then what faces away
+        """For each placement, whether a light is inside one of its closed parts or in its surface: then what faces away
         from it casts.
 
         The sum of the solid angles of a part's triangles, as the light sees them, is 4π inside and 0 outside (van
