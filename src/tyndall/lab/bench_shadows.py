@@ -36,7 +36,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +47,7 @@ from tyndall.gpu.resources import Closing
 from tyndall.lab import bench_shadows_tables as tables
 from tyndall.lab import metrics, standard
 from tyndall.lab.bench import line
+from tyndall.lab.busy import Busy
 from tyndall.lab.compare import SOFT_FRAMES
 from tyndall.lab.complexity import lines_of
 from tyndall.lab.fingerprint import scene_hash, versions
@@ -67,7 +68,12 @@ FRAME: Mapping[str, str] = {"volumetric": "off", "occlusion": "none", "antialias
 PARTS = ("cells", "errors", "shrink", "resolution", "situations", "silhouettes")
 FOLLOWS = 0.25  # of the change that the truth shows, by which a technique counts as one that follows the light's size
 
-_METHODS = ("zpass", "zfail")
+# Techniques that have several ways to do the same, and the parameter that chooses: each way is measured for itself. A
+# technique's own name stands for its default.
+_WAYS: Mapping[str, tuple[str, tuple[str, ...]]] = {
+    "shadow_map": ("rasterizer", ("", "compute")),
+    "shadow_volume": ("method", ("zpass", "zfail")),
+}
 # In metres, where the ball is in no surface and the camera still stands in the table's shadow.
 _PLACES: Mapping[str, Vec3] = {"interior": (-0.8, 1.85, -0.2)}
 
@@ -223,23 +229,25 @@ def choose(wanted: Sequence[str] | None = None) -> list[str]:
     Raises:
         ParameterError: no such technique.
     """
-    labels = []
-    for name, cls in FAMILY.members.items():
-        methods = next((get_args(f.type) for f in fields_of(cls) if f.name == "method"), ())
-        labels += [f"{name}/{method}" for method in _METHODS] if set(_METHODS) <= set(methods) else [name]
+    labels = [
+        label
+        for name in FAMILY.members
+        for label in ([f"{name}/{way}".rstrip("/") for way in _WAYS[name][1]] if name in _WAYS else [name])
+    ]
     if wanted is None:
         return labels
     known = [*labels, *FAMILY.members]
     for one in wanted:
         if one not in known:
             raise ParameterError(f"techniques: no shadow technique '{one}'{nearest(one, known)}")
-    return [label for label in labels if label in wanted or label.partition("/")[0] in wanted]
+    whole = [one for one in wanted if one not in labels]
+    return [label for label in labels if label in wanted or label.partition("/")[0] in whole]
 
 
 def make(label: str, scene: Scene, **changes: Any) -> Technique:
     """The technique of a label for a scene."""
-    name, _, method = label.partition("/")
-    return FAMILY.make(name, scene.looks, {**({"method": method} if method else {}), **changes})
+    name, _, way = label.partition("/")
+    return FAMILY.make(name, scene.looks, {**({_WAYS[name][0]: way} if way else {}), **changes})
 
 
 def counted(triangles: int, lights: int = 1) -> Scene:
@@ -444,7 +452,8 @@ class _Run:
 
     def _measured(self, stage: Stage, technique: Technique) -> Measurement:
         renderer = stage.use(technique)
-        return measure(renderer, frames=self.s.frames, warmup=self.s.warmup, budget_s=self.s.seconds)
+        with Busy(self.gpu) as busy:
+            return measure(renderer, frames=self.s.frames, warmup=self.s.warmup, budget_s=self.s.seconds, before=busy)
 
     def _errors(self) -> Iterator[Row]:
         for name in self.s.error_scenes:

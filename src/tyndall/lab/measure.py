@@ -104,8 +104,11 @@ def measure(
     warmup: int = 16,
     budget_s: float | None = None,
     progress: Callable[[float], object] | None = None,
+    before: Callable[[], object] | None = None,
 ) -> Measurement:
     """Draw ``warmup`` frames, then measure ``frames`` more.
+
+    ``before`` is called before each frame, outside of all times; :class:`~tyndall.lab.busy.Busy` is made for it.
 
     With ``budget_s`` it stops early, after at least one warm-up and two measured frames, so that both parts together
     end near that many seconds on a slow adapter; a fast one never notices. ``progress`` hears a fraction of 1.
@@ -124,6 +127,8 @@ def measure(
     for done in range(warmup):
         if done and spent() > 0.25:
             break
+        if before:
+            before()
         renderer.draw()
         renderer.timings()
         if progress:
@@ -132,6 +137,8 @@ def measure(
     host: list[float] = []
     samples: list[dict[str, float]] = []
     while len(samples) < frames and (len(samples) < 2 or spent() < 1):
+        if before:
+            before()
         host.append(renderer.draw())
         samples.append(renderer.timings())
         if progress:

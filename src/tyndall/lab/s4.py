@@ -49,8 +49,10 @@ NAMES: Mapping[str, str] = {
 
 
 def fps(technique: str, triangles: int, lights: int) -> int | None:
-    """What S4 gives for a technique ("shadow_volume/zpass" is its shadow volumes), or None where it gives nothing."""
+    """What S4 gives for a technique, or None where it gives nothing. Its shadow volumes are "shadow_volume/zpass"; maps
+    are maps, whatever draws them.
+    """
     name, _, choice = technique.partition("/")
-    if name not in FPS or choice not in ("", "zpass") or triangles not in TRIANGLES or lights not in LIGHTS:
+    if name not in FPS or choice not in ("", "zpass", "compute") or triangles not in TRIANGLES or lights not in LIGHTS:
         return None
     return FPS[name][TRIANGLES.index(triangles)][LIGHTS.index(lights)]
