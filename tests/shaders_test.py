@@ -11,6 +11,7 @@ import pytest
 from tyndall.frame import Renderer
 from tyndall.gpu.device import Gpu, GpuError
 from tyndall.gpu.params import fields_of
+from tyndall.lab.busy import Busy
 from tyndall.lab.truth import TruthSettings, trace
 from tyndall.scene.model import (
     DirectionalLight,
@@ -99,6 +100,10 @@ def test_every_entry_point_compiles_and_is_used(gpu: Gpu, monkeypatch: pytest.Mo
         world.move({0: _mirror})
         cast(gpu, world, [[0, 0, 0]], [[0, 0, -1]])
         blocked(gpu, world, [[0, 0, 0]], [[0, 0, -1]])
+    monkeypatch.setattr("tyndall.lab.busy._ROUNDS", 2)
+    monkeypatch.setitem(gpu.adapter_info, "adapter_type", "DiscreteGPU")
+    with Busy(gpu) as busy:
+        busy()
     monkeypatch.setattr("tyndall.tracing.world.STACK", 0)
     with pytest.raises(GpuError, match="-2 can be followed"):
         World(gpu, scene)

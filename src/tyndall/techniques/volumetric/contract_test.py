@@ -503,7 +503,12 @@ def test_every_parameter_from_end_to_end(gpu: Gpu, family: str, name: str, model
     techniques["shadow"] = ShadowMap(size=64)
     with Renderer(scene, (8, 6), gpu=gpu, antialiasing="none", tonemap="none", **techniques) as renderer:
         for case in cases:
-            renderer.use(family, FAMILIES[family].make(name, changes={**base, **case}))
+            made = FAMILIES[family].make(name, changes={**base, **case})
+            try:
+                renderer.use(family, made)
+            except Unsupported:
+                assert case == {"share": 1.0}, "a plane that is all that lights reach; this scene has several"
+                continue
             for _ in range(2):
                 renderer.draw()
             shot = props.read(renderer)
