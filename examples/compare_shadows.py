@@ -12,7 +12,7 @@ slab = ty.Mesh(corners[faces].reshape(-1, 3), np.arange(36).reshape(-1, 3))
 ground = ty.Mesh(
     np.array([(-6, 0, -6), (6, 0, -6), (6, 0, 6), (-6, 0, 6)], np.float32), np.array([(0, 2, 1), (0, 3, 2)])
 )
-panel = ty.RectLight((1.2, 2.5, -0.5), 30.0, direction=(-0.4, -1, 0.2), width=1.0, height=0.6)
+panel = ty.RectLight((1.2, 2.5, -0.5), (-0.4, -1, 0.2), 30.0, width=1.0, height=0.6)
 scene = ty.Scene((ty.Instance(slab), ty.Instance(ground)), (panel,), ty.Camera((-1, 2.2, 4), (0, 0.4, 0)))
 techniques = ["shadow_map", "evsm", ty.Pcss(samples=48), "shadow_volume", "penumbra_wedge"]
 result = ty.compare(scene, size=(96, 54), family="shadow", shadow=techniques, frames=3, warmup=1)
