@@ -11,6 +11,7 @@ import pytest
 EXAMPLES = sorted((Path(__file__).parents[1] / "examples").glob("*.py"))
 LEAVES = {
     "first_light": ["first_light.exr", "first_light.png"],
+    "compare_shadows": ["comparison"],
     "compare_techniques": ["comparison"],
     "own_scene": ["pyramid.json", "pyramid.png"],
     "orbit": ["orbit.webp"],

@@ -137,6 +137,22 @@ SHADOWED: dict[str, tuple[str, bool, dict[str, str]]] = {
         for name in ("shadows", "foliage", "interior", "fence")
         for shadow in ("shadow_map", "ray_traced")
     },
+    # Only flat receivers have a planar or projective shadow; `shadows` has a floor and walls.
+    **{
+        f"{name}-{shadow}": (name, False, {"volumetric": "off", "shadow": shadow})
+        for name, shadow in (
+            ("fence", "shadow_volume"),
+            ("foliage", "shadow_volume"),
+            ("interior", "shadow_volume"),
+            ("shadows", "penumbra_wedge"),
+            ("interior", "penumbra_wedge"),
+            ("interior", "pcss"),
+            ("fence", "pcss"),
+            ("shadows", "evsm"),
+            ("shadows", "projective"),
+            ("shadows", "planar"),
+        )
+    },
     "box-ray_traced_ao": ("box", False, {"volumetric": "off", "shadow": "ray_traced", "occlusion": "ray_traced_ao"}),
 }
 
