@@ -14,7 +14,7 @@ ground = ty.Mesh(
 )
 panel = ty.RectLight((1.2, 2.5, -0.5), (-0.4, -1, 0.2), 30.0, width=1.0, height=0.6)
 scene = ty.Scene((ty.Instance(slab), ty.Instance(ground)), (panel,), ty.Camera((-1, 2.2, 4), (0, 0.4, 0)))
-techniques = ["shadow_map", "evsm", ty.Pcss(samples=48), "shadow_volume", "penumbra_wedge"]
+techniques = ["shadow_map", ty.Evsm(size=256), ty.Pcss(samples=48), "shadow_volume", "penumbra_wedge"]
 result = ty.compare(scene, size=(96, 54), family="shadow", shadow=techniques, frames=3, warmup=1)
 print(result)
 result.save("comparison")
