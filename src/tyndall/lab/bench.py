@@ -32,7 +32,7 @@ import numpy as np
 
 from tyndall.gpu.device import Gpu, GpuError, choose_adapter
 from tyndall.lab import bench_tables
-from tyndall.lab.picture import check_folder, write_atomically
+from tyndall.lab.picture import check_folder, write_texts
 from tyndall.lab.stage import Overrides
 from tyndall.lab.sweep import sweep
 from tyndall.lab.sweep_spec import Plan, plan
@@ -140,13 +140,10 @@ class Bench:
             OutputError: ``folder`` is a file, or the system refuses.
         """
         target = Path(folder)
-        check_folder(target)
-        target.mkdir(parents=True, exist_ok=True)
         files = {f"{NAME}.json": json.dumps(self.document, indent=1, ensure_ascii=False) + "\n"}
         files |= {f"{NAME}-{name}.svg": text for name, text in self.plots().items()}
         files[f"{NAME}.md"] = self.markdown(f"{NAME}-")
-        for name, text in files.items():
-            write_atomically(target / name, lambda path, text=text: _write(path, text))  # type: ignore[misc]
+        write_texts(target, files)
         return target
 
 
@@ -402,7 +399,3 @@ def _truth(scene: str, s: Settings, found: Mapping[str, Sequence[Mapping[str, An
             for row in rows
         ],
     }
-
-
-def _write(path: Path, text: str) -> None:
-    path.write_text(text, encoding="utf-8")

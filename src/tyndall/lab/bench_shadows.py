@@ -52,7 +52,7 @@ from tyndall.lab.compare import SOFT_FRAMES
 from tyndall.lab.complexity import lines_of
 from tyndall.lab.fingerprint import scene_hash, versions
 from tyndall.lab.measure import Measurement, belongs, measure, wall_clock
-from tyndall.lab.picture import check_folder, write_atomically
+from tyndall.lab.picture import check_folder, write_texts
 from tyndall.lab.shadow_situations import SITUATIONS
 from tyndall.lab.stage import Stage, adapter_name, describe, driver_name
 from tyndall.lab.standard import Standard
@@ -165,11 +165,8 @@ class ShadowBench:
             OutputError: ``folder`` is a file, or the system refuses.
         """
         target = Path(folder)
-        check_folder(target)
-        target.mkdir(parents=True, exist_ok=True)
         text = json.dumps(self.document, indent=1, ensure_ascii=False) + "\n"
-        for name, content in ((f"{NAME}.json", text), (f"{NAME}.md", self.markdown())):
-            write_atomically(target / name, lambda path, content=content: _write(path, content))  # type: ignore[misc]
+        write_texts(target, {f"{NAME}.json": text, f"{NAME}.md": self.markdown()})
         return target
 
 
@@ -718,7 +715,3 @@ def _light_cost(cells: Sequence[Row]) -> dict[str, Row]:
 
 def _public(row: Row) -> Row:
     return {name: value for name, value in row.items() if name != "status"}
-
-
-def _write(path: Path, text: str) -> None:
-    path.write_text(text, encoding="utf-8")

@@ -123,6 +123,22 @@ def check_folder(folder: Path) -> None:
             raise OutputError(f"{folder}: {path} is a file, not a folder")
 
 
+def write_texts(folder: Path, texts: Mapping[str, str]) -> None:
+    """Write text files by name into a folder, which is made.
+
+    Raises:
+        OutputError: ``folder`` is a file, or the system refuses.
+    """
+    check_folder(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, text in texts.items():
+        write_atomically(folder / name, lambda path, text=text: _write(path, text))  # type: ignore[misc]
+
+
+def _write(path: Path, text: str) -> None:
+    path.write_text(text, encoding="utf-8")
+
+
 def write_atomically(path: Path, write: Callable[[Path], None]) -> None:
     """Call ``write`` with a temporary path in the same folder and the same suffix, then move that file to ``path``.
 

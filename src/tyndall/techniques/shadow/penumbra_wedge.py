@@ -65,7 +65,7 @@ class PenumbraWedge(Technique):
         visible = view.texture("visible", size, "r32float", dimension="2d-array")
         sheets: list[Sheet] = ["facing", "turned"] if has_turned(view, counter.outlines) else ["facing"]
         for sheet in sheets:
-            for light, counts, found in counter.each_with_silhouettes(segments=True, sheet=sheet):
+            for light, counts, found in counter.each(segments=True, sheet=sheet):
                 bound: dict[str, Any] = {
                     **counter.beside,
                     "volume_count": counts.stencil(),

@@ -61,16 +61,17 @@ class ShadowVolume(Technique):
 
     def render(self, view: View, content: Sequence[Content]) -> Visibility:
         """Count the volumes of each light into the masks."""
-        counted = Counter(view, self.method, ShadowMap(size=self.map_size), content)
+        maps = ShadowMap(size=self.map_size)
+        counted = Counter(view, self.method, maps, content)
         masks = mask_image(view)
-        for light, stencil in counted.each():
+        for light, stencil, _ in counted.each():
             view.compute("resolve").bind(
                 counted.beside,
                 volume_count=stencil.stencil(),
                 light_index=view.gpu.constant(light),
                 masks_out=masks.read_write(),
             ).features(has_maps=bool(counted.beside)).dispatch(*view.size)
-        return answered_by_masks(view, content, masks, ShadowMap(size=self.map_size))
+        return answered_by_masks(view, content, masks, maps)
 
 
 class Counter:
@@ -88,15 +89,8 @@ class Counter:
         if any(kind.casts_beside_outline() for kind in content):
             self.beside = dict(maps.render(view.part(maps, "beside"), content, "beside_outline").bindings)
 
-    def each(self) -> Iterator[tuple[int, Texture]]:
-        """(light, texture whose stencil values are the counts) for each light in turn."""
-        for light, stencil, _ in self.each_with_silhouettes():
-            yield light, stencil
-
-    def each_with_silhouettes(
-        self, *, segments: bool = False, sheet: Sheet = "both"
-    ) -> Iterator[tuple[int, Texture, list[Silhouette]]]:
-        """The same, and the light's silhouettes."""
+    def each(self, *, segments: bool = False, sheet: Sheet = "both") -> Iterator[tuple[int, Texture, list[Silhouette]]]:
+        """(light, texture whose stencil values are the counts, the light's silhouettes) for each light in turn."""
         view, gpu = self._view, self._view.gpu
         depth = view.images["depth"]
         if not depth.has_stencil:
