@@ -13,7 +13,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, ClassVar, Literal, get_args
+from typing import Any, ClassVar, Literal, Protocol, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -394,6 +394,55 @@ class Instance:
         object.__setattr__(self, "transform", rows)
 
 
+class Solid(Protocol):
+    """What the scene must know of an implicit surface: :class:`tyndall.sdf.Shape` is one."""
+
+    dimension: int
+
+    @property
+    def box(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Lower and upper corner (3,) of its inside; ±inf where it has no end."""
+
+
+@dataclass(frozen=True, eq=False)
+class Implicit:
+    """An implicit surface in the world.
+
+    Attributes:
+        shape: signed distances in its own space, a :class:`tyndall.sdf.Shape` of three dimensions.
+        transform: 4×4 affine (row-major, column vectors: p' = M·p) from its own space to the world.
+        material: of what in it has none of its own.
+        name: by which a frame moves and edits it.
+
+    Raises:
+        ParameterError: a flat shape, or a transform that has no inverse.
+    """
+
+    shape: Solid
+    transform: Mat4 = IDENTITY
+    material: Material = Material()
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        if getattr(self.shape, "dimension", None) != 3:
+            raise ParameterError(f"shape: {type(self.shape).__name__} is no solid shape; extrude or revolve a flat one")
+        matrix = np.asarray(self.transform, np.float64)
+        if matrix.shape != (4, 4) or not np.isfinite(matrix).all() or abs(np.linalg.det(matrix[:3, :3])) < 1e-30:
+            raise ParameterError("transform: not 4×4 finite numbers that have an inverse")
+        rows = tuple(tuple(float(x) for x in row) for row in matrix)
+        object.__setattr__(self, "transform", rows)
+
+    @cached_property
+    def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+        """Lower and upper corner in the world, each (3,); None where it has no end."""
+        low, high = self.shape.box
+        if not (np.isfinite(low).all() and np.isfinite(high).all()):
+            return None
+        matrix = np.asarray(self.transform)
+        world = box_corners(low, high) @ matrix[:3, :3].T + matrix[:3, 3]
+        return world.min(axis=0), world.max(axis=0)
+
+
 @dataclass(frozen=True)
 class Camera(_Checked):
     """A pinhole camera with an infinite far plane."""
@@ -425,6 +474,7 @@ class Scene:
 
     instances: tuple[Instance, ...] = ()
     lights: tuple[Light, ...] = ()
+    implicits: tuple[Implicit, ...] = ()
     camera: Camera = Camera()
     medium: Medium = Medium()
     background: Vec3 = param((0.0, 0.0, 0.0), 0, None, "linear radiance where no surface is")
@@ -436,7 +486,9 @@ class Scene:
         check(self)
         object.__setattr__(self, "instances", tuple(self.instances))
         object.__setattr__(self, "lights", tuple(self.lights))
-        for name, kinds in (("instances", (Instance,)), ("lights", get_args(Light))):
+        object.__setattr__(self, "implicits", tuple(self.implicits))
+        kinds_of = {"instances": (Instance,), "lights": get_args(Light), "implicits": (Implicit,)}
+        for name, kinds in kinds_of.items():
             for index, item in enumerate(getattr(self, name)):
                 if not isinstance(item, kinds):
                     expected = " or ".join(kind.__name__ for kind in kinds)
@@ -449,7 +501,9 @@ class Scene:
 
     @cached_property
     def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Lower and upper corner of the world's box, each (3,); the unit cube around 0 without geometry."""
+        """Lower and upper corner of the world's box, each (3,), without implicit surfaces that have no end; the unit cube
+        around 0 without geometry.
+        """
         lows, highs = [], []
         for instance in self.instances:
             low, high = (c.astype(np.float64) for c in instance.mesh.bounds)
@@ -457,6 +511,10 @@ class Scene:
             world = box_corners(low, high) @ matrix[:3, :3].T + matrix[:3, 3]
             lows.append(world.min(axis=0))
             highs.append(world.max(axis=0))
+        for implicit in self.implicits:
+            if implicit.bounds is not None:
+                lows.append(implicit.bounds[0])
+                highs.append(implicit.bounds[1])
         if not lows:
             return np.full(3, -0.5), np.full(3, 0.5)
         return np.min(lows, axis=0), np.max(highs, axis=0)

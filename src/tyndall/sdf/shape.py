@@ -1,0 +1,513 @@
+"""What a shape is: an immutable expression whose value at a point is a signed distance in metres, negative inside.
+
+>>> from tyndall.sdf import box, cylinder, sphere, X
+>>> part = sphere(1) & box(1.5) - cylinder(0.5).orient(X)
+>>> part([[0, 0, 0], [2, 0, 0]]).round(3)
+array([0.5, 1.25])
+
+A shape is a tree of nodes of seven kinds, each a frozen dataclass:
+
+- :class:`Primitive`: a leaf. A function of the place and up to 8 numbers, in WESL (``solids.wesl``, ``profiles.wesl``)
+  for the device, and in numpy for :meth:`Shape.__call__`, the oracle of the tests.
+- :class:`Modifier`: one child, whose place is changed before (*enter*) or whose value after (*leave*) it is asked:
+  rounding, shells, extrusion, twist … ``modifiers.wesl`` has both for the device.
+- :class:`Combination`: several children, by union, intersection or subtraction, hard or smooth.
+- :class:`Transformed`: one child, placed by an affine transform.
+- :class:`Repetition`: one child, many times.
+- :class:`Painted` gives what is in it a material; :class:`Named` gives it a name by which it can be moved.
+
+What each node says of itself it says by analysis, never by sampling:
+
+- ``lipschitz``: a bound L of how fast the value changes, |f(p) − f(q)| ≤ L·|p − q|. A step of |f|/L along a ray meets
+  no surface (Hart 1996), and what differs by more than L allows can be left out of a cell (Barbier et al. 2025).
+- ``extent(level)``: lower and upper corner of all places whose value is at most ``level``, infinite where they have no
+  end; ``box`` is that of what is inside. (A level above 0 is what rounding and smooth unions add to a shape.)
+- ``accuracy``: "exact" is the distance itself everywhere; "outside" is exact where it is positive; "bound" only never
+  says more than the distance (after division by L).
+
+Two-dimensional shapes (:attr:`Shape.dimension` 2) lie in the plane of x and y, and become solid by
+:meth:`Shape.extrude` and :meth:`Shape.revolve`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tyndall.gpu.params import ParameterError, check, fields_of, param
+from tyndall.scene.model import Material
+
+Floats = NDArray[np.float64]
+Box = tuple[Floats, Floats]
+Vec3 = tuple[float, float, float]
+Accuracy = Literal["exact", "outside", "bound"]
+Operation = Literal["union", "intersection", "subtraction"]
+Blend = Literal["polynomial", "exponential", "root"]
+
+NUMBERS = 8  # of a primitive or modifier, as S5 has it
+X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+
+
+class Shape:
+    """A node of an expression of signed distances; see the module.
+
+    Attributes:
+        dimension: 3, or 2 for a shape in the plane of x and y.
+    """
+
+    dimension: int = 3
+
+    def __post_init__(self) -> None:
+        check(self)
+
+    def __call__(self, points: ArrayLike) -> Floats:
+        """Signed distances at points, on the CPU, in double precision.
+
+        Args:
+            points: (N, 3) in metres; (N, 2) do for a shape in the plane.
+
+        Returns:
+            (N,) in metres, negative inside.
+
+        Raises:
+            ParameterError: another shape of array.
+        """
+        p = np.asarray(points, np.float64)
+        if p.ndim != 2 or p.shape[1] not in ((2, 3) if self.dimension == 2 else (3,)):
+            raise ParameterError(f"points: shape {p.shape} is not (count, {self.dimension})")
+        if p.shape[1] == 2:
+            p = np.concatenate([p, np.zeros((len(p), 1))], axis=1)
+        return self.distance(p)
+
+    def distance(self, p: Floats) -> Floats:
+        """As :meth:`__call__`, of (N, 3) float64."""
+        raise NotImplementedError
+
+    @property
+    def children(self) -> tuple[Shape, ...]:
+        """The nodes below this one."""
+        return ()
+
+    @cached_property
+    def lipschitz(self) -> float:
+        """L ≥ how fast the value changes with the place; see the module."""
+        raise NotImplementedError
+
+    @cached_property
+    def box(self) -> Box:
+        """Lower and upper corner (3,) of what is inside; ±inf where it has no end. In the plane, z is ±inf."""
+        return self.extent(0.0)
+
+    def extent(self, level: float) -> Box:
+        """The same of all places where the value is at most ``level`` ≥ 0: a box that holds them, if not the least."""
+        raise NotImplementedError
+
+    @cached_property
+    def accuracy(self) -> Accuracy:
+        """What the value is of the distance; see the module."""
+        raise NotImplementedError
+
+    @cached_property
+    def count(self) -> int:
+        """Nodes of the expression, this one and all below."""
+        return 1 + sum(child.count for child in self.children)
+
+    # --- combining ---
+
+    def __or__(self, other: Shape) -> Shape:
+        return union(self, other)
+
+    def __and__(self, other: Shape) -> Shape:
+        return intersection(self, other)
+
+    def __sub__(self, other: Shape) -> Shape:
+        return subtraction(self, other)
+
+    # --- placing ---
+
+    def at(self, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Shape:
+        """Moved by (x, y, z) metres."""
+        matrix = np.eye(4)
+        matrix[:3, 3] = x, y, z
+        return self.transform(matrix)
+
+    def rotate(self, angle: float, axis: Sequence[float] = Z) -> Shape:
+        """Turned about an axis through 0 by an angle in radians, right-handed."""
+        return self.transform(rotation(angle, axis))
+
+    def orient(self, axis: Sequence[float]) -> Shape:
+        """Turned so that its own +Z points along ``axis``."""
+        to = np.asarray(axis, np.float64)
+        length = float(np.linalg.norm(to))
+        if to.shape != (3,) or not 0 < length < math.inf:
+            raise ParameterError(f"axis: {axis} is no direction")
+        to = to / length
+        turn = np.cross(Z, to)
+        sine = float(np.linalg.norm(turn))
+        if sine < 1e-12:
+            return self if to[2] > 0 else self.rotate(math.pi, X)
+        return self.rotate(math.atan2(sine, float(to[2])), tuple(turn / sine))
+
+    def scale(self, factor: float | Sequence[float]) -> Shape:
+        """Enlarged about 0 by one factor, or by one for each axis; distances stay true under one factor."""
+        factors = np.broadcast_to(np.asarray(factor, np.float64), 3)
+        return self.transform(np.diag([*factors, 1.0]))
+
+    def transform(self, matrix: ArrayLike) -> Shape:
+        """Placed by an affine transform, 4×4 row-major for column vectors. It must have an inverse."""
+        m = np.asarray(matrix, np.float64)
+        if m.shape != (4, 4):
+            raise ParameterError(f"matrix: shape {m.shape} is not (4, 4)")
+        shape: Shape = self
+        if isinstance(self, Transformed):
+            m, shape = m @ self.placement, self.shape
+        return Transformed(shape, tuple(tuple(float(x) for x in row) for row in m))
+
+    # --- describing ---
+
+    def material(self, material: Material) -> Shape:
+        """With this material wherever a part has none of its own."""
+        return Painted(self, material)
+
+    def named(self, name: str) -> Shape:
+        """With a name, by which it can be moved once it is on the device. Several shapes may share a name."""
+        return Named(self, name)
+
+
+def rotation(angle: float, axis: Sequence[float]) -> Floats:
+    """4×4: a right-handed turn by ``angle`` radians about ``axis`` (Rodrigues 1840)."""
+    a = np.asarray(axis, np.float64)
+    length = float(np.linalg.norm(a))
+    if a.shape != (3,) or not 0 < length < math.inf:
+        raise ParameterError(f"axis: {axis} is no direction")
+    x, y, z = a / length
+    k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    matrix = np.eye(4)
+    matrix[:3, :3] += math.sin(angle) * k + (1 - math.cos(angle)) * (k @ k)
+    return matrix
+
+
+# --- kinds of nodes -----------------------------------------------------------------------------------------------
+
+
+class Primitive(Shape):
+    """A leaf: a function of the place and at most :data:`NUMBERS` numbers.
+
+    A subclass is a frozen dataclass of declared parameters with :meth:`Shape.distance`, :meth:`Shape.extent` and what
+    differs from "exact, L = 1". Its WESL function is ``fn CODE(p: vec3f, a: vec4f, b: vec4f) -> f32`` in
+    ``package::sdf::solids`` or ``package::sdf::profiles``; ``a`` and ``b`` hold :attr:`numbers`.
+
+    Attributes:
+        code: the name of that function.
+    """
+
+    code: ClassVar[str]
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """What the WESL function gets, at most 8; the declared parameters in order unless told otherwise."""
+        flat: list[float] = []
+        for f in fields_of(type(self)):
+            value = getattr(self, f.name)
+            flat.extend(value if isinstance(value, tuple) else [value])
+        return tuple(flat)
+
+    @cached_property
+    def lipschitz(self) -> float:
+        return 1.0
+
+    @cached_property
+    def accuracy(self) -> Accuracy:
+        return "exact"
+
+
+class Modifier(Shape):
+    """One child whose place is changed before it is asked, or its value after.
+
+    A subclass is a frozen dataclass whose first field is ``shape``, the child, and whose declared parameters follow.
+    In WESL (``package::sdf::modifiers``) it is ``fn CODE_enter(p, a, b) -> vec3f`` where it :attr:`warps`, and
+    ``fn CODE_leave(d: f32, p: vec3f, a, b) -> f32`` where it :attr:`adjusts`; p of the latter is the place before
+    *enter*.
+
+    Attributes:
+        code: the name of these functions.
+        warps, adjusts: which of them it has.
+        stretch: how much faster places change inside than outside: a Lipschitz bound of *enter* where the child is.
+    """
+
+    code: ClassVar[str]
+    warps: ClassVar[bool] = False
+    adjusts: ClassVar[bool] = False
+    shape: Shape
+
+    @property
+    def children(self) -> tuple[Shape, ...]:
+        return (self.shape,)
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """What the WESL functions get, at most 8."""
+        flat: list[float] = []
+        for f in fields_of(type(self)):
+            value = getattr(self, f.name)
+            flat.extend(value if isinstance(value, tuple) else [value])
+        return tuple(flat)
+
+    def enter(self, p: Floats) -> Floats:
+        """(N, 3) places that the child is asked at."""
+        return p
+
+    def leave(self, d: Floats, p: Floats) -> Floats:
+        """(N,) values from the child's, at the places before :meth:`enter`."""
+        return d
+
+    def distance(self, p: Floats) -> Floats:
+        return self.leave(self.shape.distance(self.enter(p)), p)
+
+    @cached_property
+    def stretch(self) -> float:
+        return 1.0
+
+    @cached_property
+    def lipschitz(self) -> float:
+        return self.shape.lipschitz * self.stretch
+
+
+@dataclass(frozen=True)
+class Combination(Shape):
+    """Several shapes as one.
+
+    Hard ones are the least or greatest value (n-ary). Smooth ones are taken by pairs, in a balanced tree in the given
+    order; ``smooth`` is the width k in metres over which two surfaces become one:
+
+    - "polynomial": S5's ``h = clamp(0.5 + 0.5 (d2 − d1)/k, 0, 1)``, ``mix(d2, d1, h) − k h (1 − h)``. Nothing changes
+      where the values differ by more than k.
+    - "exponential": ``−k log2(2^(−d1/k) + 2^(−d2/k))``.
+    - "root": ``(d1 + d2 − sqrt((d1 − d2)² + k²)) / 2``.
+
+    All three are 1-Lipschitz for children that are. Subtraction takes all others away from the first.
+    """
+
+    shapes: tuple[Shape, ...]
+    operation: Operation = "union"
+    smooth: float = param(0.0, 0, None, "width over which two surfaces become one; 0: a sharp edge", unit="m")
+    blend: Blend = param("polynomial", doc="how surfaces become one")
+
+    def __post_init__(self) -> None:
+        check(self)
+        object.__setattr__(self, "shapes", tuple(self.shapes))
+        if not self.shapes:
+            raise ParameterError("shapes: none are given")
+        for i, shape in enumerate(self.shapes):
+            if not isinstance(shape, Shape):
+                raise ParameterError(f"shapes[{i}]: {shape!r} is no shape")
+        if len({shape.dimension for shape in self.shapes}) > 1:
+            raise ParameterError("shapes: some are flat and some solid; extrude or revolve the flat ones first")
+        object.__setattr__(self, "dimension", self.shapes[0].dimension)
+
+    @property
+    def children(self) -> tuple[Shape, ...]:
+        return self.shapes
+
+    def distance(self, p: Floats) -> Floats:
+        values = [shape.distance(p) for shape in self.shapes]
+        if self.operation == "subtraction":
+            rest = _balanced([-v for v in values[1:]], self._greater) if len(values) > 1 else None
+            return values[0] if rest is None else self._greater(values[0], rest)
+        return _balanced(values, self._least if self.operation == "union" else self._greater)
+
+    def _least(self, a: Floats, b: Floats) -> Floats:
+        k = self.smooth
+        if k == 0:
+            return np.minimum(a, b)
+        if self.blend == "polynomial":
+            h = np.clip(0.5 + 0.5 * (b - a) / k, 0, 1)
+            return b + (a - b) * h - k * h * (1 - h)
+        if self.blend == "exponential":
+            low, apart = np.minimum(a, b), np.abs(a - b)
+            return low - k * np.log2(1 + np.exp2(-apart / k))
+        return 0.5 * (a + b - np.sqrt((a - b) ** 2 + k * k))
+
+    def _greater(self, a: Floats, b: Floats) -> Floats:
+        return -self._least(-a, -b)
+
+    @cached_property
+    def lipschitz(self) -> float:
+        return max(shape.lipschitz for shape in self.shapes)
+
+    def extent(self, level: float) -> Box:
+        pairings = math.ceil(math.log2(len(self.shapes)))
+        if self.operation == "subtraction":
+            return self.shapes[0].extent(level)
+        boxes = [shape.extent(level + self._swell * pairings) for shape in self.shapes]
+        lows, highs = np.array([low for low, _ in boxes]), np.array([high for _, high in boxes])
+        if self.operation == "union":
+            return lows.min(axis=0), highs.max(axis=0)
+        return lows.max(axis=0), np.maximum(highs.min(axis=0), lows.max(axis=0))
+
+    @property
+    def _swell(self) -> float:
+        """How much a pairing can take from the lesser of two values."""
+        if self.operation != "union":
+            return 0.0
+        return self.smooth * {"polynomial": 0.25, "exponential": 1.0, "root": 0.5}[self.blend]
+
+    @cached_property
+    def accuracy(self) -> Accuracy:
+        if len(self.shapes) == 1:
+            return self.shapes[0].accuracy
+        outside = self.operation == "union" and self.smooth == 0
+        return "outside" if outside and all(shape.accuracy != "bound" for shape in self.shapes) else "bound"
+
+
+def _balanced(values: list[Floats], pair: Any) -> Floats:
+    """Neighbours by pairs, then the results by pairs, until one is left; an odd last one waits."""
+    while len(values) > 1:
+        paired = [pair(a, b) for a, b in zip(values[::2], values[1::2], strict=False)]
+        values = paired + ([values[-1]] if len(values) % 2 else [])
+    return values[0]
+
+
+def union(*shapes: Shape, smooth: float = 0.0, blend: Blend = "polynomial") -> Shape:
+    """All of them; see :class:`Combination`."""
+    return Combination(_flat(shapes, "union", smooth), "union", smooth, blend)
+
+
+def intersection(*shapes: Shape, smooth: float = 0.0, blend: Blend = "polynomial") -> Shape:
+    """What is in all of them; see :class:`Combination`."""
+    return Combination(_flat(shapes, "intersection", smooth), "intersection", smooth, blend)
+
+
+def subtraction(shape: Shape, *others: Shape, smooth: float = 0.0, blend: Blend = "polynomial") -> Shape:
+    """The first without the others; see :class:`Combination`."""
+    return Combination((shape, *others), "subtraction", smooth, blend)
+
+
+def _flat(shapes: Iterable[Shape], operation: Operation, smooth: float) -> tuple[Shape, ...]:
+    """Hard unions of unions, and intersections of intersections, as one."""
+    result: list[Shape] = []
+    for shape in shapes:
+        same = isinstance(shape, Combination) and shape.operation == operation and shape.smooth == smooth == 0
+        result.extend(shape.children if same else [shape])
+    return tuple(result)
+
+
+@dataclass(frozen=True)
+class Transformed(Shape):
+    """One child, placed by an affine transform (4×4 rows). Values are multiplied by the transform's least stretch."""
+
+    shape: Shape
+    matrix: tuple[tuple[float, ...], ...]
+
+    def __post_init__(self) -> None:
+        m = self.placement
+        if not np.isfinite(m).all() or np.linalg.svd(m[:3, :3], compute_uv=False)[-1] <= 1e-12:
+            raise ParameterError("matrix: not finite numbers that have an inverse")
+        object.__setattr__(self, "dimension", self.shape.dimension)
+
+    @property
+    def placement(self) -> Floats:
+        """4×4, from the child's space to the parent's."""
+        return np.array(self.matrix)
+
+    @cached_property
+    def factor(self) -> float:
+        """What the child's values are multiplied by: the least singular value of the placement."""
+        linear = self.placement[:3, :3]
+        if self.dimension == 2:
+            linear = linear[:2, :2]
+        return float(np.linalg.svd(linear, compute_uv=False)[-1])
+
+    @property
+    def children(self) -> tuple[Shape, ...]:
+        return (self.shape,)
+
+    def distance(self, p: Floats) -> Floats:
+        inverse = np.linalg.inv(self.placement)
+        return self.factor * self.shape.distance(p @ inverse[:3, :3].T + inverse[:3, 3])
+
+    @cached_property
+    def lipschitz(self) -> float:
+        return self.shape.lipschitz
+
+    def extent(self, level: float) -> Box:
+        return transformed_box(self.shape.extent(level / self.factor), self.placement)
+
+    @cached_property
+    def accuracy(self) -> Accuracy:
+        singular = np.linalg.svd(self.placement[:3, :3], compute_uv=False)
+        return self.shape.accuracy if singular[0] <= singular[-1] * (1 + 1e-9) else "bound"
+
+
+def transformed_box(box: Box, matrix: Floats) -> Box:
+    """The box of a box under an affine transform; infinite sides stay infinite (Arvo 1990)."""
+    linear = matrix[:3, :3]
+    with np.errstate(invalid="ignore"):
+        a, b = linear * box[0], linear * box[1]
+    a, b = (np.where(linear == 0, 0.0, side) for side in (a, b))  # 0·inf is 0 here
+    low, high = np.minimum(a, b).sum(axis=1), np.maximum(a, b).sum(axis=1)
+    return low + matrix[:3, 3], high + matrix[:3, 3]
+
+
+@dataclass(frozen=True)
+class Painted(Shape):
+    """One child with a material wherever a part has none of its own."""
+
+    shape: Shape
+    surface: Material
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "dimension", self.shape.dimension)
+
+    @property
+    def children(self) -> tuple[Shape, ...]:
+        return (self.shape,)
+
+    def distance(self, p: Floats) -> Floats:
+        return self.shape.distance(p)
+
+    @cached_property
+    def lipschitz(self) -> float:
+        return self.shape.lipschitz
+
+    def extent(self, level: float) -> Box:
+        return self.shape.extent(level)
+
+    @cached_property
+    def accuracy(self) -> Accuracy:
+        return self.shape.accuracy
+
+
+@dataclass(frozen=True)
+class Named(Shape):
+    """One child that can be moved by its name."""
+
+    shape: Shape
+    name: str
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "dimension", self.shape.dimension)
+
+    @property
+    def children(self) -> tuple[Shape, ...]:
+        return (self.shape,)
+
+    def distance(self, p: Floats) -> Floats:
+        return self.shape.distance(p)
+
+    @cached_property
+    def lipschitz(self) -> float:
+        return self.shape.lipschitz
+
+    def extent(self, level: float) -> Box:
+        return self.shape.extent(level)
+
+    @cached_property
+    def accuracy(self) -> Accuracy:
+        return self.shape.accuracy
