@@ -474,13 +474,13 @@ class Scene:
 
     instances: tuple[Instance, ...] = ()
     lights: tuple[Light, ...] = ()
-    implicits: tuple[Implicit, ...] = ()
     camera: Camera = Camera()
     medium: Medium = Medium()
     background: Vec3 = param((0.0, 0.0, 0.0), 0, None, "linear radiance where no surface is")
     ambient: Vec3 = param((0.0, 0.0, 0.0), 0, None, "linear radiance that arrives from everywhere")
     looks: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     name: str = "scene"
+    implicits: tuple[Implicit, ...] = ()
 
     def __post_init__(self) -> None:
         check(self)
@@ -501,8 +501,9 @@ class Scene:
 
     @cached_property
     def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Lower and upper corner of the world's box, each (3,), without implicit surfaces that have no end; the unit cube
-        around 0 without geometry.
+        """Lower and upper corner of the world's box, each (3,); the unit cube around 0 without geometry.
+
+        Implicit surfaces that have no end do not count.
         """
         lows, highs = [], []
         for instance in self.instances:
