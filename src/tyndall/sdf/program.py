@@ -18,11 +18,15 @@ program where some nodes do not matter is a part of it in the same order, with a
 
 Slots, in vec4f; ``k`` is the width of a smooth join, ``L`` the Lipschitz bound of the value in the object's space:
 
-- LEAF: ``(translation, factor) (a) (b) (k, L, material or −1, −)``, and where it may be turned the three rows of the
+- LEAF: ``(translation, factor) (a) (b) (k, L, material or −1, margin)``, and where it may be turned the three rows of the
   transform from the object's to the leaf's space. The translation is subtracted; the rows hold theirs themselves.
 - COMBINE: ``(k, L, −, −)``.
 - ENTER and LEAVE of a modifier: ``(a) (b) (−, L, −, −)``; of an affine transform (code AFFINE) ``(row) (row) (row)
   (factor, L, −, −)``.
+
+A leaf that only unions lie above has a *margin* ≥ 0, others −1: where its value is above that of the whole by more than
+the margin, it does not matter. A smooth union of width k is at least a − k − k/4 where both of its values matter, so the
+margin is the sum of 5/4 k over the unions above (and what takes its place for the other blends).
 
 Affine transforms are multiplied into the leaves below, except around what changes places by itself and around parts
 with a name, which move as one.
@@ -218,6 +222,7 @@ class _Context:
     stretch: float = 1.0
     name: str = ""
     before: Floats | None = None  # of the name: the transform around it
+    margin: float = 0.0
 
     @property
     def is_placed(self) -> bool:
@@ -316,7 +321,7 @@ class _Compiler:
             (*placement[:3, 3], c.factor),
             numbers[:4],
             numbers[4:],
-            (k, shape.lipschitz * c.stretch, float(self._material(c.material)), 0),
+            (k, shape.lipschitz * c.stretch, float(self._material(c.material)), c.margin),
         )
         self._material_rows.append(slot + 3)
         if turned or c.name:
@@ -354,11 +359,15 @@ class _Compiler:
                 return
             if shape.operation != "subtraction":
                 children.sort(key=lambda child: not _is_deep(child))  # what needs a stack comes first
+            if shape.operation != "union":
+                c = replace(c, margin=-1.0)
             for i, child in enumerate(children):
                 cuts = shape.operation == "subtraction" and i > 0
                 self._emit(child, _cutting(c, cuts), inner if i else PUSH, HARD, 0.0)
         else:
             width, kind = shape.smooth * c.factor, _BLENDS[shape.blend]
+            if shape.operation != "union" or kind == ROOT:
+                c = replace(c, margin=-1.0)
             if shape.operation == "subtraction":
                 self._emit(children[0], c, PUSH, HARD, 0.0)
                 rest = children[1:]
@@ -378,6 +387,8 @@ class _Compiler:
         if len(shapes) == 1:
             self._emit(shapes[0], c, join, blend, k)
             return
+        if c.margin >= 0:
+            c = replace(c, margin=c.margin + width * (25.0 if kind == EXPONENTIAL else 1.25))
         # Pairing from the left gives a first half of a power of two.
         half = 1 << (len(shapes) - 1).bit_length() - 1
         self._pairs(shapes[:half], c, inner, kind, width, PUSH, HARD, 0.0)
@@ -395,7 +406,7 @@ class _Compiler:
         entry = len(self._words)
         self._word(ENTER, AFFINE, flags=PLACED, slot=slot)
         self._entered()
-        inside = replace(c, matrix=np.eye(4), factor=1.0, stretch=c.stretch / factor, name="", before=None)
+        inside = replace(c, matrix=np.eye(4), factor=1.0, stretch=c.stretch / factor, name="", before=None, margin=-1.0)
         self._emit(shape, inside, PUSH, HARD, 0.0)
         self._places -= 1
         if name:
@@ -421,7 +432,7 @@ class _Compiler:
         if shape.warps:
             self._word(ENTER, code, flags=PLACED, slot=slot)
             self._entered()
-        inside = replace(c, stretch=c.stretch * shape.stretch)
+        inside = replace(c, stretch=c.stretch * shape.stretch, margin=-1.0)
         self._emit(shape.shape, inside, PUSH, HARD, 0.0)
         if shape.warps:
             self._places -= 1
