@@ -36,6 +36,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -182,6 +183,7 @@ class Program:
         places: the deepest stack of places.
         lipschitz: L of the whole.
         material_rows: slots whose third number is a material's, or −1.
+        margin: by how much the whole can be below its least leaf; −1 where not all leaves have a margin.
         payload_rows: slots whose first number is that of another slot, where samples begin.
     """
 
@@ -195,10 +197,33 @@ class Program:
     material_rows: NDArray[np.intp]
     payload_rows: NDArray[np.intp]
 
+    margin: float = -1.0
+
     @property
     def size(self) -> int:
         """Instructions."""
         return len(self.words)
+
+    @cached_property
+    def spans(self) -> NDArray[np.uint32]:
+        """(n, 2): of what joins two values, where the first one begins, and where the second one does."""
+        spans = np.zeros((len(self.words), 2), np.uint32)
+        starts: list[int] = []
+        entered: list[int] = []
+        for i, word in enumerate(self.words[:, 0].tolist()):
+            kind, joins = word >> 16 & 0xF, word >> 20 & 0xF != PUSH
+            if kind == LEAF and joins:
+                spans[i] = starts[-1], i
+            elif kind == LEAF:
+                starts.append(i)
+            elif kind == COMBINE:
+                second = starts.pop()
+                spans[i] = starts[-1], second
+            elif kind == ENTER:
+                entered.append(i)
+            elif word & PLACED:
+                starts[-1] = entered.pop()
+        return spans
 
 
 def compile_shape(shape: Shape, kinds: Kinds) -> Program:
@@ -240,6 +265,7 @@ class _Compiler:
         self._depth = self._places = self._deepest = self._most_places = 0
         self._material_rows: list[int] = []
         self._payload_rows: list[int] = []
+        self._margins: list[float] = []
 
     def compile(self, shape: Shape) -> Program:
         if shape.dimension != 3:
@@ -257,6 +283,7 @@ class _Compiler:
             shape.lipschitz,
             np.array(self._material_rows, np.intp),
             np.array(self._payload_rows, np.intp),
+            max(self._margins) if min(self._margins) >= 0 else -1.0,
         )
 
     # A node leaves one value: pushed, or joined to the value before it where ``join`` is not PUSH.
@@ -324,6 +351,7 @@ class _Compiler:
             (k, shape.lipschitz * c.stretch, float(self._material(c.material)), c.margin),
         )
         self._material_rows.append(slot + 3)
+        self._margins.append(c.margin)
         if turned or c.name:
             self._put(*np.linalg.inv(placement)[:3])
         if c.name:
