@@ -1,5 +1,8 @@
 """Implicit surfaces: shapes as expressions of signed distance functions, and their evaluation."""
 
+from tyndall.sdf.grid import Grid as Grid
+from tyndall.sdf.grid import from_mesh as from_mesh
+from tyndall.sdf.shape import Shape as Shape
 from tyndall.sdf.shape import X as X
 from tyndall.sdf.shape import Y as Y
 from tyndall.sdf.shape import Z as Z
