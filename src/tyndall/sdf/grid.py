@@ -94,6 +94,11 @@ class Grid(Primitive):
 
     @property
     def payload(self) -> NDArray[np.float32]:
+        """All samples, x fastest."""
+        return self._flat
+
+    @cached_property
+    def _flat(self) -> NDArray[np.float32]:
         return self.samples.reshape(-1)
 
     def distance(self, p: Floats) -> Floats:
@@ -103,11 +108,11 @@ class Grid(Primitive):
         cell = np.minimum(q.astype(np.int64), counts - 2)
         f = q - cell
         first = cell @ (1, counts[0], counts[0] * counts[1])
-        flat, value = self.samples.reshape(-1), np.zeros(len(p))
+        value = np.zeros(len(p))
         for corner in range(8):
             bits = np.array([corner & 1, corner >> 1 & 1, corner >> 2])
             weight = np.where(bits, f, 1 - f).prod(axis=1)
-            value += weight * flat[first + int(bits @ (1, counts[0], counts[0] * counts[1]))]
+            value += weight * self._flat[first + int(bits @ (1, counts[0], counts[0] * counts[1]))]
         square = (away**2).sum(axis=1)
         outside = ((p < self.low) | (p > np.array(self.low) + (counts - 1) * self.step)).any(axis=1)
         return np.where(outside, np.sqrt(square + value**2), value)

@@ -11,8 +11,9 @@ import pytest
 
 from tyndall.gpu.device import Gpu
 from tyndall.gpu.params import ParameterError
-from tyndall.scene.model import Mesh
-from tyndall.sdf import Grid, Shape, box, from_mesh, sphere
+from tyndall.scene.model import Implicit, Mesh
+from tyndall.sdf import Grid, Shape, Y, box, from_mesh, sphere, union
+from tyndall.sdf.field import Field
 from tyndall.sdf.grid import Triangles
 
 CUBE = props.box((-1, -1, -1), (1, 1, 1)).mesh
@@ -177,10 +178,10 @@ def test_one_line_says_what_is_wrong() -> None:
 
 
 def test_the_device_has_the_same_values(gpu: Gpu) -> None:
-    """In the lattice, on its faces and outside; samples behind other slots, the index in the bits of a.x."""
+    """In the lattice, on its faces and outside; samples behind other slots."""
     grid = bowl()
     numbers = np.array(grid.numbers, np.float32)
-    numbers[:1] = np.array([3], np.uint32).view(np.float32)
+    numbers[0] = 3
     payload = np.pad(grid.payload, (0, -grid.payload.size % 4)).reshape(-1, 4)
     slots = np.concatenate([numbers.reshape(2, 4), np.full((1, 4), np.nan, np.float32), payload])
     places = np.random.default_rng(6).uniform(-2.5, 2.5, (4096, 4)).astype(np.float32)
@@ -200,3 +201,30 @@ def test_the_device_has_the_same_values(gpu: Gpu) -> None:
     finally:
         buffer.destroy()
     np.testing.assert_allclose(found, grid(places[:, :3]), atol=3e-6)
+
+
+def test_in_a_field_it_blends_and_is_marched(gpu: Gpu) -> None:
+    """Two copies of one grid, joined with a ball: rays meet the surface where the numpy values are 0."""
+    grid = bowl()
+    shape = union(grid.at(-1.2), grid.rotate(1.0, Y).scale(0.7).at(1.2), sphere(0.6), smooth=0.3)
+    text = """
+        import package::sdf::march::march_closest;
+        fn evaluate(x: vec4f) -> vec4f {
+            let hit = march_closest(vec3f(x.xy, 4.0), vec3f(0.0, 0.0, -1.0), 0.0, 10.0, 0.0);
+            return vec4f(hit.t, f32(hit.steps), 0.0, 0.0);
+        }
+    """
+    rays = np.random.default_rng(7).uniform(-1, 1, (1000, 4)).astype(np.float32) * np.float32([2.5, 1.2, 0, 0])
+    with Field(gpu, [Implicit(shape)]) as field:
+        field.update()
+        found = props.evaluate(gpu, "test_sdf_grid_field", text, rays, field.bindings)
+    hit = found[:, 0] < 10
+    depths = np.linspace(4, -4, 200)
+    places = np.concatenate([np.repeat(rays[:, None, :2], 200, axis=1), np.tile(depths[:, None], (1000, 1, 1))], axis=2)
+    inside = (shape(places.reshape(-1, 3)).reshape(1000, 200) < 0).any(axis=1)
+    assert 0.2 < inside.mean() < 0.9
+    assert not (inside & ~hit).any()
+    assert (hit & ~inside).mean() < 0.02  # glancing ones, between two places
+    there = np.stack([*rays[hit, :2].T, 4 - found[hit, 0]], axis=1)
+    assert np.abs(shape(there)).max() < 1e-4
+    assert np.median(found[hit, 1]) < 40

@@ -260,8 +260,8 @@ class Primitive(Shape):
     def payload(self) -> NDArray[np.float32] | None:
         """More numbers than 8, (N,), which the function reads from ``implicit_slots`` by fours.
 
-        Where there are any, ``bitcast<u32>(a.x)`` is the index of their first slot on the device, whatever the first
-        of :attr:`numbers` is.
+        Where there are any, ``a.x`` is the index of their first slot on the device, whatever the first of
+        :attr:`numbers` is. The same array of several shapes is there once.
         """
         return None
 
