@@ -247,16 +247,6 @@ class Shape:
         x, y, z = axis
         return repetition.Polar(self, count, (x, y, z))
 
-    # --- describing ---
-
-    def material(self, material: Material) -> Shape:
-        """With this material wherever a part has none of its own."""
-        return Painted(self, material)
-
-    def named(self, name: str) -> Shape:
-        """With a name, by which it can be moved once it is on the device. Several shapes may share a name."""
-        return Named(self, name)
-
     # --- showing ---
 
     def to_mesh(
@@ -298,6 +288,16 @@ class Shape:
         from tyndall.sdf import slices
 
         return slices.show_gradient(self, x=x, y=y, z=z, size=size, pixels=pixels)
+
+    # --- describing ---
+
+    def material(self, material: Material) -> Shape:
+        """With this material wherever a part has none of its own."""
+        return Painted(self, material)
+
+    def named(self, name: str) -> Shape:
+        """With a name, by which it can be moved once it is on the device. Several shapes may share a name."""
+        return Named(self, name)
 
 
 def _modified(kind: str, *arguments: Any) -> Shape:
