@@ -243,9 +243,13 @@ class Trapezoid(Profile):
             raise ParameterError("trapezoid: both sides are 0")
 
     def distance(self, p: Floats) -> Floats:
-        x, y = 0.5 * self.bottom, 0.5 * self.top
-        h = 0.5 * self.height
-        return polygon_distance(p, ((-x, -h), (x, -h), (y, h), (-y, h)))
+        low, high, h = 0.5 * self.bottom, 0.5 * self.top, 0.5 * self.height
+        q = folded(p)  # one half, whose left side is inside and so never nearest
+        w, e = q - [low, -h], np.array([high - low, 2 * h])
+        slope = length(w - e * np.clip(w @ e / (e @ e), 0, 1)[:, None])
+        away, beyond = np.maximum(q[:, 0] - np.where(q[:, 1] < 0, low, high), 0), np.abs(q[:, 1]) - h
+        d = np.minimum(slope, np.hypot(away, beyond))
+        return np.where((e[0] * w[:, 1] > e[1] * w[:, 0]) & (beyond < 0), -d, d)
 
     @property
     def corners(self) -> Box:

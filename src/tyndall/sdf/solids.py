@@ -70,8 +70,9 @@ def face(p: Floats, normal: Vec3, out: Vec3, along: Vec3, height: float, apothem
     """Distance from a polyhedron's face in the chamber of one of its edges: the face's normal and height above 0; the
     direction out over the edge and its distance from the face's middle; the direction along the edge and half its
     length."""
-    h, u = p @ np.array(normal) - height, p @ np.array(out) - apothem
-    v = np.maximum(np.abs(p @ np.array(along)) - half, 0)
+    h: Floats = p @ np.array(normal) - height
+    u: Floats = p @ np.array(out) - apothem
+    v: Floats = np.maximum(np.abs(p @ np.array(along)) - half, 0)
     return np.where((h > 0) & (u > 0), np.sqrt(h * h + u * u + v * v), h)
 
 
@@ -316,7 +317,7 @@ class RoundCone(Solid):
         sine = (self.radius_a - self.radius_b) / h
         cosine = math.sqrt(1 - sine * sine)
         k = cosine * y - sine * x
-        between = cosine * x + sine * y - self.radius_a
+        between: Floats = cosine * x + sine * y - self.radius_a
         top = np.hypot(x, y - h) - self.radius_b
         return np.where(k < 0, np.hypot(x, y) - self.radius_a, np.where(k > cosine * h, top, between))
 
@@ -355,10 +356,15 @@ class Vesica(Solid):
 
     @property
     def corners(self) -> Box:
-        # The spindle lies in a cylinder, and in two cones of tangents at its tips; the cylinder will do.
+        # How far it reaches along each axis: to the arc's place in that direction, or to a tip.
         axis = np.subtract(self.b, self.a)
-        wide = self.width * np.sqrt(np.maximum(1 - (axis / np.linalg.norm(axis)) ** 2, 0))
-        return np.minimum(self.a, self.b) - wide, np.maximum(self.a, self.b) + wide
+        r = 0.5 * float(np.linalg.norm(axis))
+        d = 0.5 * (r * r - self.width**2) / self.width
+        along = np.abs(axis) / (2 * r)
+        across = np.sqrt(np.maximum(1 - along**2, 0))
+        reach = np.where((d + self.width) * along < r, d + self.width - d * across, r * along)
+        middle = 0.5 * np.add(self.a, self.b)
+        return middle - reach, middle + reach
 
 
 @dataclass(frozen=True)
