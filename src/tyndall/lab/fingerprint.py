@@ -1,8 +1,8 @@
 """What a result was made from: the scene's content hash and the versions that took part.
 
 The hash covers all that reaches a picture: geometry, expressions of implicit surfaces, transforms, materials and their
-texels, lights, camera, medium, background and ambient light. Names of the scene and its parts, and the looks that techniques start from, do not count:
-the techniques' own parameters are written beside the hash.
+texels, lights, camera, medium, background and ambient light. Names of the scene and its parts, and the looks that
+techniques start from, do not count: the techniques' own parameters are written beside the hash.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def _digest(value: Any, digests: dict[int, bytes]) -> bytes:
 
 
 def _from_below(value: Any, digests: Mapping[int, bytes]) -> Iterator[Any]:
-    """A value after all that hangs below it, as far as it has no digest yet: a shape may be deeper than Python's stack."""
+    """A value after all that hangs below it and has no digest yet: a shape may be deeper than Python's stack."""
     waiting = [value]
     while waiting:
         missing = [child for child in getattr(waiting[-1], "children", ()) if id(child) not in digests]

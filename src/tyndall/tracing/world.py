@@ -120,10 +120,12 @@ class World(Closing):
         self._box = self._buffer("box", layout.box, f"{_BUILD}::Box")
         self._starts = self._buffer("starts", 4 * (len(layout.hanging) + 1))
         self.bindings: dict[str, Any] = {
-            "trace_root": self._root.read().declaring(
+            "trace_root": self._root.read()
+            .declaring(
                 TRACE_INSTANCED=layout.instanced,
                 TRACE_MASKED=any(m.alpha_mode == "mask" for m in meshes.material_list),
-            ).telling(_FIELDS.format(module="fields" if self._fields else "no_fields")),
+            )
+            .telling(_FIELDS.format(module="fields" if self._fields else "no_fields")),
             **(self._fields.bindings if self._fields else {}),
             "trace_nodes": self._nodes.split(),
             "trace_triangles": self._triangles.split(),
