@@ -14,7 +14,7 @@ from tyndall.gpu.params import ParameterError
 from tyndall.scene.model import Implicit, Instance, Mesh, Scene, box_corners
 from tyndall.sdf.meshing import to_mesh
 from tyndall.sdf.paint import painted
-from tyndall.sdf.shape import Box, Shape
+from tyndall.sdf.shape import Shape
 
 RESOLUTION = 128
 _BEYOND = 4.0  # of the scene's diagonal: where what has no end is cut off
@@ -60,7 +60,7 @@ def _taken(normals: NDArray[np.float32] | None, used: NDArray[np.int64]) -> NDAr
     return None if normals is None else normals[used]
 
 
-def _cut(shape: Shape, implicit: Implicit, scene: Scene) -> Box:
+def _cut(shape: Shape, implicit: Implicit, scene: Scene) -> tuple[list[float], list[float]]:
     """Its box, with ends in its own space where it has none."""
     places = [*scene.bounds, np.asarray(scene.camera.position)]
     places += [np.asarray(position) for light in scene.lights if (position := getattr(light, "position", None))]
@@ -68,4 +68,6 @@ def _cut(shape: Shape, implicit: Implicit, scene: Scene) -> Box:
     reach = _BEYOND * float(np.linalg.norm(high - low))
     back = np.linalg.inv(np.asarray(implicit.transform))
     corners = box_corners(low - reach, high + reach) @ back[:3, :3].T + back[:3, 3]
-    return np.maximum(shape.box[0], corners.min(axis=0)), np.minimum(shape.box[1], corners.max(axis=0))
+    lower = np.maximum(shape.box[0], corners.min(axis=0))
+    upper = np.minimum(shape.box[1], corners.max(axis=0))
+    return lower.tolist(), upper.tolist()

@@ -56,7 +56,8 @@ class _Brush:
     def stroke(self, shape: Shape, p: Floats, inherited: int) -> tuple[Floats, Numbers]:
         """Values at places, and whose material they have."""
         while isinstance(shape, Painted):
-            shape, inherited = shape.shape, self.numbers[id(shape.surface)]
+            inherited = self.numbers[id(shape.surface)]
+            shape = shape.shape
         if not any(isinstance(node, Painted) for node in _nodes(shape)):
             return shape.distance(p), np.full(len(p), inherited)
         match shape:
@@ -91,7 +92,7 @@ class _Brush:
     def _asked(self, shape: Shape, p: Floats, inherited: int) -> tuple[Floats, Numbers]:
         """Of a node with one child that asks it elsewhere, and perhaps more than once: the least answer's."""
         spy = _Spy(shape.children[0], self, inherited)
-        value = dataclasses.replace(shape, shape=spy).distance(p)  # type: ignore[call-arg, type-var]
+        value = dataclasses.replace(shape, shape=spy).distance(p)  # type: ignore[type-var]
         best, which = np.full(len(p), np.inf), np.full(len(p), inherited)
         for answer, mine in spy.answers:
             if len(answer) == len(p):
