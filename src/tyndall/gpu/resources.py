@@ -98,9 +98,7 @@ class Bound:
         return self.telling("\n".join(f"const {name} = {str(value).lower()};" for name, value in constants.items()))
 
     def telling(self, text: str) -> Bound:
-        """The same, with declarations in WESL that shaders may import beside it; ``import`` statements, of one line
-        each, may be among them.
-        """
+        """The same, with WESL declarations (and imports, a line each) that shaders may import beside it."""
         preamble = "\n".join(filter(None, [self.slot.preamble, text]))
         return Bound(replace(self.slot, preamble=preamble), self.native)
 
