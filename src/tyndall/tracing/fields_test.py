@@ -11,10 +11,9 @@ import props
 import pytest
 from numpy.typing import NDArray
 
-from tyndall.gpu.device import Gpu
-from tyndall.scene.model import Implicit, Instance, Material, Scene
+from tyndall.gpu.device import Gpu, _all_bound, _bindings_module
+from tyndall.scene.model import Implicit, Instance, Mat4, Material, Scene
 from tyndall.sdf import box, sphere
-from tyndall.sdf.shape import Shape
 from tyndall.tracing.cast import blocked, cast, pack_rays
 from tyndall.tracing.world import World
 
@@ -70,9 +69,11 @@ def unit(v: Floats) -> Floats:
     return result
 
 
-def moved(x: float, y: float, z: float) -> tuple[tuple[float, ...], ...]:
-    matrix = np.eye(4)
-    matrix[:3, 3] = x, y, z
+def placed(
+    move: tuple[float, float, float] = (0, 0, 0), scale: tuple[float, float, float] = (1, 1, 1)
+) -> tuple[tuple[float, ...], ...]:
+    matrix = np.diag([*scale, 1.0])
+    matrix[:3, 3] = move
     return tuple(tuple(row) for row in matrix.tolist())
 
 
@@ -80,7 +81,7 @@ def rays_at(radius: float, count: int = 400, seed: int = 0) -> tuple[Floats, Flo
     """From up to ten radii away to somewhere about the shape; the numbers are those of float32."""
     rng = np.random.default_rng(seed)
     origins = unit(rng.normal(size=(count, 3))) * rng.uniform(1.8, 10, (count, 1)) * radius
-    ways = rng.uniform(-0.8, 0.8, (count, 3)) * radius - origins
+    ways = rng.uniform(-1.3, 1.3, (count, 3)) * radius - origins
     return origins.astype(np.float32).astype(float), ways.astype(np.float32).astype(float)
 
 
@@ -157,6 +158,53 @@ def test_rays_that_leave_meet_what_is_there(gpu: Gpu, make: object, hits: object
     assert (found & (rise < -0.01) & ~hidden).sum() == 0, "leaks"
 
 
+@pytest.mark.parametrize(
+    ("implicit", "place"),
+    [
+        pytest.param(Implicit(sphere(1.0).scale((1, 1, 0.05))), placed(scale=(1, 1, 0.05)), id="stretched shape"),
+        pytest.param(
+            Implicit(sphere(1.0), placed(scale=(0.05, 1, 2))), placed(scale=(0.05, 1, 2)), id="stretched object"
+        ),
+        pytest.param(Implicit(sphere(1.0), placed((900, 20, -600))), placed((900, 20, -600)), id="far away"),
+        pytest.param(
+            Implicit(sphere(1.0).at(900, 20, -600), placed((-900, -20, 600))), placed(), id="far from its origin"
+        ),
+        pytest.param(Implicit(sphere(900.0).at(0, -900, 0)), placed((0, -900, 0), (900, 900, 900)), id="planet"),
+    ],
+)
+def test_rays_leave_whatever_the_numbers_are_like(gpu: Gpu, implicit: Implicit, place: Mat4) -> None:
+    """Where values are less than distances, and where coordinates are large beside the shape."""
+    matrix = np.array(place)
+    rng = np.random.default_rng(4)
+    target = unit(rng.normal(size=(400, 3)))
+    if matrix[1, 1] > 100:  # near the top, where the world's coordinates are small
+        target = unit(np.array([0, 1, 0]) + 1e-3 * rng.normal(size=(400, 3)))
+    goal = target @ matrix[:3, :3].T + matrix[:3, 3]
+    outward = unit(target @ np.linalg.inv(matrix[:3, :3]))
+    origins = (goal + 2 * unit(outward + 0.5 * rng.normal(size=goal.shape))).astype(np.float32).astype(float)
+    ways = (goal - origins).astype(np.float32).astype(float)
+    back = np.linalg.inv(matrix)
+    t, local = ball_hits(origins @ back[:3, :3].T + back[:3, 3], ways @ back[:3, :3].T, 1.0)
+    there = np.isfinite(t)
+    normals = unit(local @ back[:3, :3])
+    onward = unit(rng.normal(size=origins.shape))
+    rise = (onward * normals).sum(1)
+    with World(gpu, Scene(implicits=[implicit])) as world:
+        position, normal, answer = probe(gpu, world, origins, ways, 0, 1, 4, onward=onward)
+    found = there & (position[:, 3] > 0)
+    assert found.sum() > 150
+    assert (found == there).mean() > 0.99
+    apart = np.abs((position[:, :3] - origins - t[:, None] * ways) * normals).sum(1)[found]
+    assert (
+        np.percentile(apart, 98)
+        < 4e-6 * np.abs(np.concatenate([origins, origins @ back[:3, :3].T + back[:3, 3]])).max()
+    )
+    assert np.percentile(np.abs(normal[found, :3] - normals[found]).max(1), 90) < 0.02
+    hidden = answer[:, 0] > 0.5
+    assert (found & (rise > 0.02) & hidden).sum() == 0, "acne"
+    assert (found & (rise < -0.02) & ~hidden).sum() == 0, "leaks"
+
+
 def test_the_nearer_of_a_mesh_and_an_implicit_surface_is_hit(gpu: Gpu) -> None:
     red = Material(base_color=(0.8, 0.1, 0.2, 1), roughness=0.3, metallic=0.25, emissive=(1, 2, 3))
     blue = Material(base_color=(0.1, 0.2, 0.8, 1), roughness=0.7)
@@ -179,11 +227,19 @@ def test_the_nearer_of_a_mesh_and_an_implicit_surface_is_hit(gpu: Gpu) -> None:
 
 def test_a_scene_of_meshes_has_no_code_for_implicit_surfaces(gpu: Gpu) -> None:
     """Nor one of its bindings."""
-    with World(gpu, Scene([props.wall(-1)])) as world:
-        assert not [name for name in world.bindings if name.startswith("implicit")]
-        blocked(gpu, world, [[0, 0, 1]], [[0, 0, -1]])
-    texts = [linked.wgsl for linked, _ in gpu._modules.values()] if gpu._modules else []
-    assert not any("march" in text for text in texts)
+    texts = {}
+    for name, scene in (
+        ("meshes", Scene([props.wall(-1)])),
+        ("both", Scene([props.wall(-1)], implicits=[Implicit(box())])),
+    ):
+        with World(gpu, scene) as world:
+            bound = _all_bound({**world.bindings, "rays": gpu.constant(0), "hits": gpu.constant(0)})
+            assert any(b.startswith("implicit") for b in bound) == (name == "both")
+            text = _bindings_module(tuple(bound), tuple(b.slot for b in bound.values()))
+            text += "const ray_count = 1u; const cull = 0u; const answers = 0u;"
+            texts[name] = gpu.linker.link("package::tracing::cast", ("cast_closest",), text, {}, {}).wgsl
+    assert "march" not in texts["meshes"]
+    assert "march" in texts["both"]
 
 
 def test_nothing_is_left_on_the_device(gpu: Gpu) -> None:
@@ -192,6 +248,3 @@ def test_nothing_is_left_on_the_device(gpu: Gpu) -> None:
         held = sum(resource.size_bytes for resource in world.resources())
         assert held == gpu.ledger.total - sum(before.values())
     assert gpu.ledger.by_owner() == before
-
-
-_: type[Shape]
