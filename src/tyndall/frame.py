@@ -20,6 +20,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tyndall.content.contract import Content
+from tyndall.content.implicit import Fields
 from tyndall.content.mesh import GBUFFER_TARGETS, Meshes
 from tyndall.gpu.device import Gpu, GpuError
 from tyndall.gpu.params import ParameterError
@@ -116,7 +118,8 @@ class Renderer(Closing):
         self._views: dict[str, View] = {}
         self._resources: list[Resource] = []
         self._images: dict[str, Texture] = {}
-        self._content: list[Meshes] = []
+        self._content: list[Content] = []
+        self._fields: Fields | None = None
         self._world: World | None = None
         self._frame = 0
         self._history = 0
@@ -137,14 +140,18 @@ class Renderer(Closing):
         black = gpu.texture("frame.black", (1, 1), "rgba32float", owner=OWNER, usage="sampled")
         self._resources.append(black)
         gpu.write_texture(black, np.zeros((1, 1, 4), np.float32))
-        self._content = [Meshes(gpu, self.scene)]
+        self._meshes = Meshes(gpu, self.scene)
+        self._content = [self._meshes]
+        if self.scene.implicits:
+            self._fields = Fields(gpu, self.scene, size)
+            self._content.append(self._fields)
         self._targets = _TARGETS if any(content.emits for content in self._content) else _TARGETS[:2]
         for name, format in _IMAGES.items():
             if name in _TARGETS and name not in self._targets:
                 self._images[name] = black  # nothing shines by itself: a load outside of it is 0 as well
                 continue
             drawn = name in _TARGETS or name in ("depth", "inscatter")
-            stored = name not in (*_TARGETS, "depth")
+            stored = name != "depth" and (name not in _TARGETS or self._fields is not None)
             usage = " ".join(["sampled", *(["target"] if drawn else []), *(["storage"] if stored else [])])
             image = gpu.texture(f"frame.{name}", size, format or gpu.depth_format, owner=OWNER, usage=usage)
             self._images[name] = image
@@ -163,6 +170,8 @@ class Renderer(Closing):
             "inscatter_out": self._images["inscatter"].write(),
             "transmittance_out": self._images["transmittance_map"].write(),
         }
+        if self._fields:
+            self._scope |= {f"{name}_out": self._images[name].write() for name in self._targets}
         gpu.write(self._medium, pack_medium(self.scene.medium, gpu.dtype(_MEDIUM)))
         gpu.write(self._lights, pack_lights(self.scene, gpu.dtype(_LIGHT)))
         for family, technique in techniques.items():
@@ -207,7 +216,7 @@ class Renderer(Closing):
     def world(self) -> World:
         """The scene for rays; built when it is asked for first, freed by :meth:`use` once no technique casts any."""
         if self._world is None:
-            self._world = World(self.gpu, self.scene, meshes=self._content[0])
+            self._world = World(self.gpu, self.scene, meshes=self._meshes)
         return self._world
 
     def technique(self, family: str) -> Any:
@@ -247,11 +256,15 @@ class Renderer(Closing):
         scope = self._scope
 
         targets = [(images[name].view(), (0.0, 0.0, 0.0, 0.0)) for name in self._targets]
+        if self._fields:
+            self._fields.field.update()
         # Its stencil, where it has one, is cleared with it: drivers pack the two, and clear both at once or neither.
         clear = 0 if images["depth"].has_stencil else None
         with gpu.render("gbuffer.mesh", targets, (images["depth"].view(), 0.0), stencil=clear) as native:
             for content in self._content:
                 content.draw_gbuffer(native, scope, emissive="emissive" in self._targets)
+        for content in self._content:
+            content.march_gbuffer(scope, images["depth"], emissive="emissive" in self._targets)
 
         shadow = self._view("shadow")
         shadow.maps_wanted = self.technique("volumetric").reads_maps

@@ -86,6 +86,8 @@ class DepthMaps(Technique):
         maps = view.texture("maps", size, "depth32float", dimension="2d-array", usage="sampled target")
         for index in range(count):
             scope = {"shadow_layers": table.read(), "layer": view.gpu.constant(index)}
+            for kind in content:
+                kind.prepare("depth", scope, (self.size, self.size), view.owner)
             with view.gpu.render(view.owner, depth=(maps.view(layer=index), 0.0)) as native:
                 for kind in content:
                     kind.draw_depth(native, scope, self.cull, casters)
