@@ -26,6 +26,7 @@ from tyndall.gpu.device import Gpu, Raster
 from tyndall.gpu.resources import Bound, Resource, Texture
 from tyndall.scene.model import Implicit, Material, Scene
 from tyndall.sdf.field import Field
+from tyndall.sdf.shape import Named, Painted, Shape
 
 MODULE = "package::content::implicit"
 OWNER = "implicit"
@@ -37,6 +38,7 @@ class Fields:
     Attributes:
         field: the objects.
         emits: whether a material does, so that the G-buffer has a target for it.
+        parts: names of parts of the shapes.
     """
 
     def __init__(self, gpu: Gpu, scene: Scene, size: tuple[int, int]) -> None:
@@ -45,6 +47,7 @@ class Fields:
         self._maps: dict[int, Texture] = {}
         self._shade: Texture | None = None
         self.emits = any(any(material.emissive) for one in scene.implicits for material in materials_of(one))
+        self.parts = {node.name for one in scene.implicits for node in nodes_of(one.shape) if isinstance(node, Named)}
         self.field = Field(gpu, scene.implicits)
         try:
             for name, format in (("depth", "r32float"), ("ids", "r32uint")):
@@ -179,9 +182,13 @@ class Fields:
 def materials_of(implicit: Implicit) -> Iterator[Material]:
     """The materials of an implicit surface: its own, and those of its parts."""
     yield implicit.material
-    waiting: list[Any] = [implicit.shape]
+    yield from (node.surface for node in nodes_of(implicit.shape) if isinstance(node, Painted))
+
+
+def nodes_of(shape: Any) -> Iterator[Shape]:
+    """The nodes of a shape, in no order that matters."""
+    waiting: list[Shape] = [shape]
     while waiting:
-        shape = waiting.pop()
-        if isinstance(surface := getattr(shape, "surface", None), Material):
-            yield surface
-        waiting.extend(shape.children)
+        node = waiting.pop()
+        yield node
+        waiting.extend(node.children)

@@ -74,7 +74,7 @@ class DepthMaps(Technique):
         """Draw all maps of what casts."""
         first_finer = sum(layer_count(light) for light in view.scene.lights)
         count = self.map_count(view.scene)
-        table = view.buffer("layers", lambda: self._rows(view, max(1, count)), element=_LAYER)
+        table = view.fitted("layers", lambda: self._rows(view, max(1, count)), element=_LAYER)
         if count > first_finer:
             self._move_finer(view, table, first_finer)
         shared = {"shadow_layers": table.read(), "shadow_params": view.params}

@@ -76,7 +76,7 @@ class Projective(Technique):
             "outlines", (self.size, self.size, max(1, count * images)), SHADE_TARGET[0], dimension="2d-array",
             usage="sampled target",
         )  # fmt: skip
-        table = view.buffer("silhouettes", lambda: self._rows(view, planes), element=_SILHOUETTE).read()
+        table = view.fitted("silhouettes", lambda: self._rows(view, planes), element=_SILHOUETTE).read()
         for layer in range(count):
             targets = [(outlines.view(layer=layer * images + image), (1.0, 1.0, 1.0, 1.0)) for image in range(images)]
             scope = {"silhouettes": table, "layer": gpu.constant(layer)}
