@@ -128,6 +128,7 @@ class Renderer(Closing):
         self._casters = True
         self._time: float | None = None
         self._moved = False
+        self._uploaded = self._sent = 0
         self._previous: NDArray[np.float64] | None = None
         self._camera_seen: Camera | None = None
         self._camera_row: Any = None
@@ -274,7 +275,10 @@ class Renderer(Closing):
 
         targets = [(images[name].view(), (0.0, 0.0, 0.0, 0.0)) for name in self._targets]
         if self._fields:
-            self._fields.field.update()
+            field = self._fields.field
+            self._uploaded = field.uploaded - self._sent
+            field.update()
+            self._sent = field.uploaded
         # Its stencil, where it has one, is cleared with it: drivers pack the two, and clear both at once or neither.
         clear = 0 if images["depth"].has_stencil else None
         with gpu.render("gbuffer.mesh", targets, (images["depth"].view(), 0.0), stencil=clear) as native:
@@ -395,7 +399,7 @@ class Renderer(Closing):
     @property
     def uploaded(self) -> int:
         """Bytes that the last frame's implicit surfaces were sent to the device anew: 0 where nothing has moved."""
-        return self._fields.field.uploaded if self._fields else 0
+        return self._uploaded
 
     def _hold(self, low: NDArray[np.float64], high: NDArray[np.float64]) -> None:
         """Let the scene's box hold another one: by more than it needs, so that maps are seldom fitted anew."""

@@ -87,10 +87,12 @@ def test_depth_and_normals_are_a_spheres(gpu: Gpu) -> None:
         normals = gpu.read_texture(renderer._images["normal_roughness"])[..., :3].astype(float)
     assert 200 < inside.sum() < 3000
     pixel = 2 * math.tan(ABOVE.fov / 2) / SIZE[1] * distance
-    assert (np.abs(depth - distance) < 0.5 * pixel / np.sqrt(1 - off / RADIUS**2).clip(0.1))[inside].all()
+    cosine = np.sqrt(np.maximum(1 - off / RADIUS**2, 0.01))
+    assert (np.abs(depth - distance) < 0.5 * pixel / cosine)[inside].all()
     assert np.isinf(depth[off > (RADIUS + pixel.max()) ** 2]).all()
     expected = (seen.at(np.where(inside, distance, 1)) - CENTRE) / RADIUS
-    assert np.sum(normals * expected, -1)[inside].min() > 0.998
+    assert np.sum(normals * expected, -1)[inside].min() > 0.98, "they are of a place up to half a pixel off"
+    assert np.median(np.sum(normals * expected, -1)[inside]) > 0.9995
 
 
 def test_the_nearer_of_mesh_and_surface_is_seen(gpu: Gpu) -> None:
@@ -108,7 +110,7 @@ def test_the_nearer_of_mesh_and_surface_is_seen(gpu: Gpu) -> None:
 def test_the_material_is_an_objects_own(gpu: Gpu) -> None:
     shine = Material(base_color=(0.2, 0.5, 0.9, 1), metallic=0.25, roughness=0.4, emissive=(0.5, 3, 0.25))
     matt = Material(base_color=(0.9, 0.04, 0.0, 1), roughness=0.9)
-    objects = [Implicit(sphere(0.5), at(x, 0, -2), material) for x, material in ((-0.6, shine), (0.6, matt))]
+    objects = [Implicit(sphere(0.4), at(x, 0, -2), material) for x, material in ((-0.6, shine), (0.6, matt))]
     with Renderer(Scene(camera=props.AHEAD, implicits=objects), props.TINY, gpu=gpu, **QUIET) as renderer:
         renderer.draw()
         row = {
@@ -121,7 +123,7 @@ def test_the_material_is_an_objects_own(gpu: Gpu) -> None:
         np.testing.assert_allclose(albedo[3], material.metallic, atol=0.003)
         np.testing.assert_allclose(row["normal_roughness"][column, 3], material.roughness, atol=1e-3)
         np.testing.assert_allclose(row["emissive"][column, :3], material.emissive, atol=1e-3)
-    assert not any(row[name][0].any() for name in row), "the background stays empty"
+    assert not any(row[name][[0, 7, 8]].any() for name in row), "the background stays empty"
 
 
 LIGHTS = [
