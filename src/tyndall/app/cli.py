@@ -118,7 +118,9 @@ def render(
     ] = None,
     view: Annotated[
         str | None,
-        typer.Option(metavar="NAME", help="Not the picture but steps, normals, depth, ids, albedo or roughness."),
+        typer.Option(
+            metavar="NAME", help="Not the picture but steps, normals, depth, ids, albedo, roughness or slice."
+        ),
     ] = None,
     out: Out = None,
     as_json: Json = False,
