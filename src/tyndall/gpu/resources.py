@@ -100,13 +100,8 @@ class Bound:
         """The same, with constants that shaders may import beside it: branches on them cost nothing."""
         return self.telling("\n".join(f"const {name} = {str(value).lower()};" for name, value in constants.items()))
 
-    def telling(self, text: str) -> Bound:
-        """The same, with WESL declarations (and imports, a line each) that shaders may import beside it."""
-        preamble = "\n".join(filter(None, [self.slot.preamble, text]))
-        return Bound(replace(self.slot, preamble=preamble), self.native)
-
     def telling(self, text: str, *, untrusted: bool = False) -> Bound:
-        """The same, with WESL declarations that shaders may import beside it.
+        """The same, with WESL declarations (and imports, a line each) that shaders may import beside it.
 
         Args:
             untrusted: a user wrote some of it.

@@ -6,5 +6,7 @@ from tyndall.sdf.shape import Z as Z
 from tyndall.sdf.shape import intersection as intersection
 from tyndall.sdf.shape import subtraction as subtraction
 from tyndall.sdf.shape import union as union
+from tyndall.sdf.snippets import SnippetError as SnippetError
+from tyndall.sdf.snippets import snippet as snippet
 from tyndall.sdf.solids import box as box
 from tyndall.sdf.solids import sphere as sphere

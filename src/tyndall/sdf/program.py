@@ -83,11 +83,15 @@ class Kinds:
             self.version += 1
         return known[key][0]
 
+    def sources(self) -> list[Any]:
+        """The texts among them that a user wrote (:class:`~tyndall.sdf.snippets.SnippetSource`)."""
+        shapes = [shape for _, shape in (*self._primitives.values(), *self._modifiers.values())]
+        return [shape.source for shape in shapes if getattr(shape, "untrusted", False)]  # type: ignore[union-attr]
+
     @property
     def is_trusted(self) -> bool:
         """Whether none of them is a user's code."""
-        shapes = [shape for _, shape in (*self._primitives.values(), *self._modifiers.values())]
-        return not any(getattr(shape, "untrusted", False) for shape in shapes)
+        return not self.sources()
 
     def wesl(self) -> str:
         """Text for the bindings module: ``implicit_primitive``, ``implicit_enter`` and ``implicit_leave``."""
