@@ -85,8 +85,8 @@ class Kinds:
 
     def sources(self) -> list[Any]:
         """The texts among them that a user wrote (:class:`~tyndall.sdf.snippets.SnippetSource`)."""
-        shapes = [shape for _, shape in (*self._primitives.values(), *self._modifiers.values())]
-        return [shape.source for shape in shapes if getattr(shape, "untrusted", False)]  # type: ignore[union-attr]
+        shapes: list[Any] = [shape for _, shape in (*self._primitives.values(), *self._modifiers.values())]
+        return [shape.source for shape in shapes if getattr(shape, "untrusted", False)]
 
     @property
     def is_trusted(self) -> bool:
