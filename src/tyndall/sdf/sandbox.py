@@ -22,7 +22,7 @@ import bisect
 import hashlib
 import itertools
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NoReturn
@@ -291,7 +291,9 @@ def admit(text: str, origin: Origin, *, given: Mapping[str, str] | None = None, 
         if found := _language(tokens):
             word, language = found
             raise _RefusedError(word.at, f"this looks like {language} ('{word.text}'); snippets are in WGSL: {example}")
-        digest = hashlib.blake2b("\0".join([text, *given]).encode("utf-8", "surrogatepass"), digest_size=8).hexdigest()
+        digest = hashlib.blake2b(
+            "\0".join([text, *given, *given.values()]).encode("utf-8", "surrogatepass"), digest_size=8
+        ).hexdigest()
         reader = _Reader(tokens, f"s{digest}x", given)
         reader.module()
     except _RefusedError as refused:
@@ -649,7 +651,8 @@ class _Reader:
                 raise _RefusedError(at[name], f"'{name}' has more than {EXPANDED} words once its calls are inlined")
 
 
-def joined(names: Iterable[str]) -> str:
-    """``'a', 'b' or 'c'``."""
-    quoted = [f"'{name}'" for name in names]
-    return quoted[0] if len(quoted) == 1 else f"{', '.join(quoted[:-1])} or {quoted[-1]}"
+def is_free(name: str) -> bool:
+    """Whether a snippet may give something this name."""
+    return bool(re.fullmatch(r"[A-Za-z_]\w*", name, re.ASCII)) and not (
+        name in _OWN or name in _RESERVED or _FORBIDDEN.fullmatch(name)
+    )

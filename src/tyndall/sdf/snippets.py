@@ -381,13 +381,18 @@ def _origin(function: Callable[..., Any], text: str, literal: str) -> Origin:
 _VALIDATED: WeakKeyDictionary[Gpu, set[str]] = WeakKeyDictionary()
 
 
+def known_to(gpu: Gpu) -> set[str]:
+    """The functions whose types a device's driver has checked."""
+    return _VALIDATED.setdefault(gpu, set())
+
+
 def validate(gpu: Gpu, source: SnippetSource) -> None:
     """Let the driver check a snippet's types, alone; each text once for each device.
 
     Raises:
         SnippetError: with the place in the user's file.
     """
-    known = _VALIDATED.setdefault(gpu, set())
+    known = known_to(gpu)
     if source.function in known:
         return
     check_text(gpu, source.admitted, source.wesl)
