@@ -1,5 +1,9 @@
 """Implicit surfaces: shapes as expressions of signed distance functions, and their evaluation."""
 
+from tyndall.sdf.files import load as load
+from tyndall.sdf.files import save as save
+from tyndall.sdf.shading import FragmentShader as FragmentShader
+from tyndall.sdf.shading import ShadedMaterial as ShadedMaterial
 from tyndall.sdf.shape import X as X
 from tyndall.sdf.shape import Y as Y
 from tyndall.sdf.shape import Z as Z

@@ -272,6 +272,11 @@ class SnippetKind:
         slope = self._lipschitz(**named) if callable(self._lipschitz) else self._lipschitz
         return Snippet(self.source, tuple(values), slope, tuple(low), tuple(high), self._growth, self._exact)  # type: ignore[arg-type]
 
+    @property
+    def bounds(self) -> dict[str, Any]:
+        """What is declared of all its shapes: ``lipschitz``, ``box``, ``growth`` and ``exact``."""
+        return {"lipschitz": self._lipschitz, "box": self._box, "growth": self._growth, "exact": self._exact}
+
     def __repr__(self) -> str:
         return f"<snippet {self.__name__}{self.__signature__}>"
 
@@ -317,6 +322,19 @@ def snippet(
         return SnippetKind(source, parameters, box, lipschitz, growth, exact, doc)
 
     return declare
+
+
+def kind_of(source: SnippetSource, *, lipschitz: float, box: Bounded | None, growth: float, exact: bool) -> SnippetKind:
+    """The constructor of a snippet's shapes whose parameters are those of the text, as a file has it."""
+    told = source.main.parameters[1:]
+    if [tp for _, tp in told] == [_STRUCT]:
+        fields: list[tuple[str, Any, Any]] = [(f"data{i}", float, param(0.0)) for i in range(NUMBERS)]
+    else:
+        types = [float if _WIDTHS[tp] == 1 else tuple[(float,) * _WIDTHS[tp]] for _, tp in told]  # type: ignore[misc]
+        fields = [(name, tp, param(...)) for (name, _), tp in zip(told, types, strict=True)]
+    name = re.sub(r"\W", "_", f"_{source.name}" if not source.name[:1].isalpha() else source.name)
+    parameters = make_dataclass(name, fields, frozen=True, namespace={"__post_init__": check})
+    return SnippetKind(source, parameters, box, lipschitz, growth, exact, source.name)
 
 
 def _parameters(function: Callable[..., Any]) -> type:
