@@ -200,9 +200,10 @@ def _language(tokens: list[Word]) -> tuple[Word, str] | None:
             other = other or word
         elif word.text in ("Primitive3D", "FragmentProperties") and after is not None and after.kind == "name":
             slang = slang or word
-    if slang is not None:
-        return slang, "Slang or HLSL"
-    return (other, "GLSL") if other is not None else None
+    found = [word for word in (slang, other) if word is not None]
+    if not found:
+        return None
+    return min(found, key=lambda word: word.at), "GLSL" if slang is None else "Slang or HLSL"
 
 
 # --- taking apart and putting together ----------------------------------------------------------------------------

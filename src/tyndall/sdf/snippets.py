@@ -77,7 +77,7 @@ class SnippetSource:
 
     name: str
     text: str
-    id: int | None = field(default=None, compare=False)
+    id: int | None = field(default=None, compare=False, repr=False)
     origin: Origin = field(default=Origin("<snippet>"), compare=False, repr=False)
     oracle: Callable[..., Any] | None = field(default=None, compare=False, repr=False)
 

@@ -13,8 +13,8 @@ from functools import cache
 from types import UnionType
 from typing import Any, Literal, Union, get_args, get_origin
 
-import tyndall.sdf  # all nodes are declared once it is loaded
 from tyndall.gpu.params import Field
+from tyndall.sdf import modifiers, solids
 from tyndall.sdf.shape import Combination, Named, Operation, Painted, Primitive, Shape, Transformed
 from tyndall.sdf.snippets import Snippet
 
@@ -27,6 +27,7 @@ OPERATIONS: dict[str, Operation] = {
     "SmoothSubtraction": "subtraction",
 }
 GROUP = "Operations/Group"
+_DECLARED = (modifiers, solids)  # where nodes are declared, and loaded with this module
 _SPECIAL = (Combination, Transformed, Painted, Named, Snippet)
 
 

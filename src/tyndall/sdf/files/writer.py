@@ -14,7 +14,7 @@ from tyndall.scene.files.atomic import atomic_write
 from tyndall.scene.files.scene_json import to_text
 from tyndall.scene.model import Implicit, Material
 from tyndall.sdf.files.names import GROUP, is_data, type_names
-from tyndall.sdf.files.reader import FIRST_ID
+from tyndall.sdf.files.reader import FIRST_ID, MOST_NODES
 from tyndall.sdf.shading import FragmentShader, ShadedMaterial
 from tyndall.sdf.shape import Combination, Named, Painted, Primitive, Shape, Transformed
 from tyndall.sdf.snippets import Snippet, SnippetSource
@@ -24,7 +24,7 @@ def write_model(shape: Shape, path: Path, name: str) -> None:
     """See :func:`tyndall.sdf.files.save`."""
     writer = _Writer()
     try:
-        node = writer.node(shape)
+        node = writer.whole(shape)
         record = {"name": name, **writer.tables(), "model": node}
         text = f"{to_text(record)}\n".encode()
     except (ParameterError, UnicodeEncodeError) as error:
@@ -49,7 +49,7 @@ def pack_objects(implicits: Sequence[Implicit]) -> dict[str, Any]:
                     "name": implicit.name,
                     "transform": [list(row) for row in implicit.transform],
                     "material_id": writer.material(implicit.material),
-                    "shape": writer.node(shape),
+                    "shape": writer.whole(shape),
                 }
             )
     except RecursionError:
@@ -111,6 +111,12 @@ class _Writer:
         return record
 
     # --- nodes ---
+
+    def whole(self, shape: Shape) -> dict[str, Any]:
+        """The root of a shape."""
+        if shape.count > MOST_NODES:
+            raise ParameterError(f"shape: {shape.count} nodes; a file has at most {MOST_NODES}")
+        return self.node(shape)
 
     def node(self, shape: Shape) -> dict[str, Any]:
         """A shape and all below it: its place, name and material are the node's where they are so nested."""
