@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 
+import numpy as np
 import pytest
 
 from tyndall.sdf import sandbox
@@ -154,3 +155,41 @@ def test_place_in_a_json_string() -> None:
         admit(code, Origin("x.json", file, start, escaped=True), example="")
     column = file.splitlines()[2].index("banana") + 1
     assert str(error.value).startswith(f"x.json:3:{column}: no such name: 'banana'")
+
+
+_PIECES = (
+    "fn let var const struct loop { } ( ) [ ] < > ; , : . -> :: @ @compute var<storage> implicit_cells package import "
+    "/* */ // p x vec3f array<f32,4> 1.0 2u = + - * & && return if for while continuing break switch case default"
+)
+BITS = _PIECES.split()
+
+
+def test_whatever_is_written_the_host_is_not_named() -> None:
+    """Texts made of pieces of a good one and of what may not be in one: refused, or all its names are its own."""
+    random = np.random.default_rng(1)
+    pieces = re.findall(r"\w+|\s+|[^\w\s]", GOOD)
+    admitted_count, told = 0, []
+    for _ in range(500):
+        text = list(pieces)
+        for _ in range(random.integers(1, 4)):
+            at = int(random.integers(len(text)))
+            kind = random.integers(3)
+            if kind == 0:
+                del text[at]
+            elif kind == 1:
+                text.insert(at, f" {BITS[random.integers(len(BITS))]} ")
+            else:
+                text[at] = text[int(random.integers(len(text)))]
+        try:
+            admitted = admit("".join(text), Origin("x"), example="")
+        except SnippetError as error:
+            told.append(str(error))
+            continue
+        admitted_count += 1
+        names = re.findall(r"(?<![\w.])[A-Za-z_]\w*", re.sub(r"\.\s+", ".", admitted.wesl))
+        members = {"length", "sides"}
+        assert all(n in sandbox._OWN | members or n.startswith(admitted.prefix) for n in names), admitted.wesl
+        loops = len(re.findall(r"\b(?:loop|while|for)\b", admitted.wesl))
+        assert admitted.wesl.count("-= 1u;") == loops
+    assert all(re.fullmatch(r"x:\d+:\d+: [^\n]+", line) for line in told)
+    assert admitted_count > 20

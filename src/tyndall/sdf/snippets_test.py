@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+import props
 import pytest
 
 from tyndall.gpu.device import Gpu
@@ -16,7 +17,7 @@ from tyndall.scene.model import Implicit
 from tyndall.sdf import snippets
 from tyndall.sdf.field import Field
 from tyndall.sdf.sandbox import ROUNDS, SnippetError
-from tyndall.sdf.shape import Floats, Vec3
+from tyndall.sdf.shape import Floats, Shape, Vec3, union
 from tyndall.sdf.snippets import Snippet, SnippetSource, evaluate, snippet, validate
 from tyndall.sdf.solids import box, sphere
 
@@ -191,6 +192,58 @@ def test_a_field_tells_what_does_not_compile(gpu: Gpu) -> None:
     bad = of("fn f(p: vec3f) -> f32 {\n  return 2u;\n}")
     with pytest.raises(SnippetError, match="<snippet>:2:"):
         Field(gpu, [Implicit(bad)])
+
+
+_RAYS = """
+import package::bindings::out;
+import package::sdf::march::{march_closest, field_normal};
+@compute @workgroup_size(8, 8)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    let direction = normalize(vec3f((vec2f(id.xy) - 15.5) / 32.0, -1.0));
+    let hit = march_closest(vec3f(0.0, 0.5, 3.0), direction, 0.0, 100.0, 0.0);
+    out[32u * id.y + id.x] = vec4f(hit.t, field_normal(0u, vec3f(0.0, 0.5, 3.0) + hit.t * direction, 0.001));
+}
+"""
+
+
+def march(gpu: Gpu, shape: Shape) -> Floats:
+    """(32, 32, 4) of a small picture: distance of the hit, and the normal there."""
+    with (
+        props.module(gpu, "test_snippet_rays", _RAYS) as path,
+        Field(gpu, [Implicit(shape)]) as field,
+        gpu.buffer("test.out", 16 * 1024, owner="test", element="vec4f") as out,
+    ):
+        field.update()
+        gpu.compute("test", path, "main").bind(field.bindings, out=out.read_write()).dispatch(32, 32)
+        got = gpu.read_buffer(out).view(np.float32).reshape(32, 32, 4).astype(np.float64)
+        gpu.forget_groups()
+    return got
+
+
+def test_it_is_drawn_like_a_solid(gpu: Gpu) -> None:
+    got = march(gpu, ball(0.8))
+    x, y = np.meshgrid(*2 * [(np.arange(32) - 15.5) / 32])
+    d = np.stack([x, y, -np.ones_like(x)], axis=2)
+    d /= np.linalg.norm(d, axis=2, keepdims=True)
+    along = -3 * d[..., 2]  # to the foot of the centre's perpendicular
+    square = 0.8**2 - (9 - along**2)
+    inside = square > 0.01
+    assert 100 < inside.sum() < 1000
+    t = along - np.sqrt(np.maximum(square, 0))
+    np.testing.assert_allclose(got[..., 0][inside], t[inside], atol=2e-3)
+    assert (got[..., 0][square < -0.01] > 100).all()
+    normals = ((0, 0.5, 3) + t[..., None] * d - (0, 0.5, 0)) / 0.8
+    np.testing.assert_allclose(got[..., 1:][inside], normals[inside], atol=5e-3)
+
+
+def test_a_picture_with_an_endless_loop_comes(gpu: Gpu) -> None:
+    """Also where it is one part of many, which are pruned by its values."""
+    endless = of("fn f(p: vec3f) -> f32 { var x = p.x; loop { x += 1.0; } return x; }")
+    started = time.monotonic()
+    march(gpu, endless)
+    bounded = Snippet(endless.source, (), 1.0, (-1, -1, -1), (1, 1, 1))
+    march(gpu, union(bounded, *(sphere(0.1).at(0.1 * i) for i in range(20)), smooth=0.1))
+    assert time.monotonic() - started < 60
 
 
 def test_the_same_name_twice(gpu: Gpu) -> None:

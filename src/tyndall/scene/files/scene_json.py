@@ -166,7 +166,7 @@ def save(scene: Scene, path: Path) -> None:
     if wrong:
         raise SceneError(path, wrong)
     try:
-        text = f"{to_text(plain)}\n".encode()
+        text = f"{_text(plain)}\n".encode()
     except UnicodeEncodeError as error:
         raise SceneError(path, "a name in the scene is not text that UTF-8 can hold") from error
 
@@ -196,14 +196,14 @@ def _plain(value: Any, where: str, wrong: list[str]) -> Any:
     return value
 
 
-def to_text(value: Any, margin: str = "\n") -> str:
+def _text(value: Any, margin: str = "\n") -> str:
     """JSON whose lists of plain values, rows of a matrix among them, stay on one line."""
     inner = f"{margin}  "
     if isinstance(value, dict) and value:
-        members = (f"{json.dumps(key, ensure_ascii=False)}: {to_text(item, inner)}" for key, item in value.items())
+        members = (f"{json.dumps(key, ensure_ascii=False)}: {_text(item, inner)}" for key, item in value.items())
         return f"{{{inner}{f',{inner}'.join(members)}{margin}}}"
     if isinstance(value, list) and any(isinstance(item, (dict, list)) for item in value):
-        return f"[{inner}{f',{inner}'.join(to_text(item, inner) for item in value)}{margin}]"
+        return f"[{inner}{f',{inner}'.join(_text(item, inner) for item in value)}{margin}]"
     return json.dumps(value, ensure_ascii=False, allow_nan=False)
 
 

@@ -549,3 +549,28 @@ def test_places_of_texts() -> None:
     text = '{"a": ["x", {"b\\n": "y", "c": [1, "z"]}], "d": "w", "e": {}}'
     found = {path: text[at] for path, at in places(text).items()}
     assert found == {("a", 0): "x", ("a", 1, "b\n"): "y", ("a", 1, "c", 1): "z", ("d",): "w"}
+
+
+def test_whatever_a_file_holds_it_is_told_in_lines(folder: Path) -> None:
+    """Files with a value exchanged for another, or left out: loaded, or refused with a path."""
+    random = np.random.default_rng(2)
+    odd: list[Any] = [None, True, -1, 0, 1e30, 1e400, "x", "", [], {}, [1, 2, 3], {"x": 1}, [[]], "Primitives/Sphere"]
+    sources = [SPHERE, THREE, SCENE, BLEND_MATERIAL, BLEND_SHADER, HEX_PRISM]
+
+    def mutate(value: Any) -> Any:
+        if random.random() < 0.08:
+            return odd[random.integers(len(odd))]
+        if isinstance(value, dict):
+            return {k: mutate(v) for k, v in value.items() if random.random() > 0.04}
+        return [mutate(v) for v in value] if isinstance(value, list) else value
+
+    loaded, told = 0, []
+    for i in range(400):
+        path = write(folder, mutate(parse(sources[i % len(sources)])))
+        try:
+            load(path)
+            loaded += 1
+        except SceneError as error:
+            told += error.mistakes
+    assert all(mistake and "\n" not in mistake for mistake in told)
+    assert 20 < loaded < 380

@@ -8,14 +8,13 @@ of a node; and snippets, which are custom primitives.
 
 from __future__ import annotations
 
-import dataclasses
 from functools import cache
 from types import UnionType
 from typing import Any, Literal, Union, get_args, get_origin
 
 from tyndall.gpu.params import Field
 from tyndall.sdf import modifiers, solids
-from tyndall.sdf.shape import Combination, Named, Operation, Painted, Primitive, Shape, Transformed
+from tyndall.sdf.shape import Combination, Modifier, Named, Operation, Painted, Primitive, Shape, Transformed
 from tyndall.sdf.snippets import Snippet
 
 OPERATIONS: dict[str, Operation] = {
@@ -59,7 +58,7 @@ def node_classes() -> dict[str, type[Shape]]:
         and not c.__module__.endswith("_test")
         and not c.__name__.startswith("_")
         and c not in _SPECIAL
-        and not (dataclasses.fields(c) == () and c.__subclasses__())
+        and (hasattr(c, "code") or not issubclass(c, (Primitive, Modifier)))  # else it is what others share
     ]
     solid = {c.__name__ for c in classes if issubclass(c, Primitive) and not _is_flat(c)}
     for c in classes:

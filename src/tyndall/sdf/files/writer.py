@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,13 +12,14 @@ from typing import Any
 from tyndall.gpu.params import ParameterError, fields_of
 from tyndall.scene.errors import SceneError
 from tyndall.scene.files.atomic import atomic_write
-from tyndall.scene.files.scene_json import to_text
 from tyndall.scene.model import Implicit, Material
 from tyndall.sdf.files.names import GROUP, is_data, type_names
 from tyndall.sdf.files.reader import FIRST_ID, MOST_NODES
 from tyndall.sdf.shading import FragmentShader, ShadedMaterial
 from tyndall.sdf.shape import Combination, Named, Painted, Primitive, Shape, Transformed
 from tyndall.sdf.snippets import Snippet, SnippetSource
+
+_ON_ONE_LINE = {"x", "y", "z", "name", "type", "value", "data"}
 
 
 def write_model(shape: Shape, path: Path, name: str) -> None:
@@ -26,7 +28,7 @@ def write_model(shape: Shape, path: Path, name: str) -> None:
     try:
         node = writer.whole(shape)
         record = {"name": name, **writer.tables(), "model": node}
-        text = f"{to_text(record)}\n".encode()
+        text = f"{_text(record)}\n".encode()
     except (ParameterError, UnicodeEncodeError) as error:
         raise SceneError(
             path, "a name is not text that UTF-8 can hold" if isinstance(error, UnicodeError) else str(error)
@@ -193,6 +195,19 @@ class _Writer:
         if shape.exact:
             record["exact"] = True
         return record
+
+
+def _text(value: Any, margin: str = "\n") -> str:
+    """JSON whose lists and vectors of plain values stay on one line."""
+    inner = f"{margin}  "
+    items = value.values() if isinstance(value, dict) else value if isinstance(value, (list, tuple)) else ()
+    flat = not any(isinstance(item, (dict, list, tuple)) for item in items)
+    if flat and (not isinstance(value, dict) or set(value) <= _ON_ONE_LINE):
+        return json.dumps(value, ensure_ascii=False, allow_nan=False)
+    if isinstance(value, dict):
+        members = (f"{json.dumps(key, ensure_ascii=False)}: {_text(item, inner)}" for key, item in value.items())
+        return f"{{{inner}{f',{inner}'.join(members)}{margin}}}"
+    return f"[{inner}{f',{inner}'.join(_text(item, inner) for item in value)}{margin}]"
 
 
 def transform(shape: Transformed) -> dict[str, Any]:
