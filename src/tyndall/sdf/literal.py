@@ -24,6 +24,9 @@ What is written is what a careful person writes:
 - smooth unions of the polynomial kind are written as ``min(a, b) − max(k − |a − b|, 0)² / 4k``, which is the same as
   S5's form, by pairs in the same order as in :class:`~tyndall.sdf.shape.Combination`.
 
+Objects that are unions of very many leaves can be looped over instead (:mod:`tyndall.sdf.listed`): their rows are then
+in a buffer ``scene_rows: array<vec4f>``, which must be bound, and may change without new code.
+
 The text declares, and a shader that has it among its bindings may import:
 
 - ``scene_distance(p: vec3f) -> f32``, in the world;
@@ -34,14 +37,16 @@ The text declares, and a shader that has it among its bindings may import:
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from tyndall.gpu.params import ParameterError
 from tyndall.scene.model import Implicit, Material
+from tyndall.sdf.listed import List
 from tyndall.sdf.shape import Combination, Floats, Modifier, Named, Painted, Primitive, Shape, Transformed
 
 _STRUCT = """struct SceneSurface {
@@ -74,42 +79,74 @@ class Literal:
     Attributes:
         text: WESL; see the module.
         materials: by their numbers.
+        lists: what is looped over, in the order of its rows in ``scene_rows``.
     """
 
     text: str
     materials: tuple[Material, ...]
+    lists: tuple[List, ...] = ()
+
+    def rows(self, moves: Mapping[str, ArrayLike] | None = None) -> NDArray[np.float32]:
+        """What ``scene_rows`` holds, (N, 4) float32, with named leaves moved; see :meth:`List.rows`."""
+        empty = np.zeros((1, 4), np.float32)
+        return np.concatenate([each.rows(moves) for each in self.lists]) if self.lists else empty
 
 
-def literal(implicits: Sequence[Implicit]) -> Literal:
+def literal(implicits: Sequence[Implicit], *, loops: Collection[int] = ()) -> Literal:
     """Write the code of objects that are joined by a hard union.
 
+    Args:
+        loops: numbers of the objects that are looped over.
+
     Raises:
-        ParameterError: no object, or a node that has no code.
+        ParameterError: no object, a node that has no code, or an object that is no list.
     """
     if not implicits:
         raise ParameterError("implicits: none are given")
     materials: dict[Material, int] = {}
     imports: set[tuple[str, str]] = set()
     blends: set[str] = set()
+    lists: dict[int, List] = {}
+    for i in sorted(loops):
+        found = List.of(_shape(implicits[i]), implicits[i].material)
+        if found is None:
+            raise ParameterError(f"implicits[{i}]: it is no union of leaves alone")
+        lists[i] = found
+    listed, first = [], 0
+    for i, each in lists.items():
+        numbers = [materials.setdefault(m, len(materials)) for m in each.materials]
+        listed += _loops(each, i, first, numbers, imports)
+        blends |= {each.blend} if each.smooth else set()
+        first += len(each.leaves) * each.stride
     bodies = []
-    for tracked in (False, True):
-        writer = _Writer(materials, imports, blends, tracked)
-        values = [writer.object(implicit) for implicit in implicits]
+    for with_material in (False, True):
+        writer = _Writer(materials, imports, blends, with_material)
+        values = [
+            writer.listed(i, lists[i]) if i in lists else writer.object(implicit)
+            for i, implicit in enumerate(implicits)
+        ]
         bodies.append((writer, writer.pairs(values, "union", 0.0, "polynomial")))
-    (plain, distance), (tracked_writer, found) = bodies
+    (plain, distance), (tracked, nearest) = bodies
     parts = [
         *(f"import package::sdf::{module}::{{{name}}};" for module, name in sorted(imports)),
         _STRUCT,
         *(_BLENDS[blend] for blend in sorted(blends)),
+        *listed,
         _function("scene_distance", "f32", [*plain.lines, f"return {plain.text(distance)};"]),
-        _function("scene_material", "u32", _needed([*tracked_writer.lines, f"return {found.material};"])),
+        _function("scene_material", "u32", _needed([*tracked.lines, f"return {nearest.material};"])),
         _surfaces(tuple(materials)),
     ]
-    return Literal("\n".join(parts) + "\n", tuple(materials))
+    return Literal("\n".join(parts) + "\n", tuple(materials), tuple(lists.values()))
+
+
+def _shape(implicit: Implicit) -> Shape:
+    shape: Any = implicit.shape
+    placed: Shape = shape.transform(implicit.transform)
+    return placed
 
 
 def _function(name: str, result: str, lines: Sequence[str]) -> str:
-    return "\n".join([f"fn {name}(p: vec3f) -> {result} {{", *(f"    {line}" for line in lines), "}"])
+    return _indented(f"fn {name}(p: vec3f) -> {result}", lines)
 
 
 def _needed(lines: Sequence[str]) -> list[str]:
@@ -233,9 +270,15 @@ class _Writer:
         self._count = 0
 
     def object(self, implicit: Implicit) -> _Value:
-        shape: Any = implicit.shape
-        placed = shape.transform(implicit.transform)
-        return self._node(placed, _Place("p", np.eye(4)), implicit.material)
+        """A whole object."""
+        return self._node(_shape(implicit), _Place("p", np.eye(4)), implicit.material)
+
+    def listed(self, index: int, each: List) -> _Value:
+        """An object that is looped over."""
+        if self._tracked and len(each.materials) > 1:
+            pair = self._let("v", f"scene_nearest_{index}(p)")
+            return _Value(f"{pair}.x", 1.0, f"u32({pair}.y)")
+        return _Value(self._let("d", f"scene_list_{index}(p)"), 1.0, self._number_of(each.materials[0]))
 
     def _number_of(self, material: Material) -> str:
         return f"{self._materials.setdefault(material, len(self._materials))}u"
@@ -267,12 +310,7 @@ class _Writer:
         return value if value.factor == 1 else _Value(self._let("d", self.text(value)), 1.0, value.material)
 
     def _function(self, node: Primitive | Modifier, name: str) -> str:
-        module = getattr(node, "module", None)
-        if module is None:
-            module = "modifiers" if isinstance(node, Modifier) else "solids" if node.dimension == 3 else "profiles"
-        alias = f"{module}_{name}"
-        self._imports.add((module, f"{name} as {alias}"))
-        return alias
+        return _imported(node, name, self._imports)
 
     def _node(self, node: Shape, place: _Place, material: Material) -> _Value:
         match node:
@@ -354,6 +392,80 @@ class _Writer:
             nearer = f"{b.name} {'<' if least else '>'} {a.name}"
             material = self._let("m", f"select({a.material}, {b.material}, {nearer})")
         return _Value(self._let("d", result), 1.0, material)
+
+
+def _imported(node: Primitive | Modifier, name: str, imports: set[tuple[str, str]]) -> str:
+    """The name that a node's function is imported by."""
+    module = "modifiers" if isinstance(node, Modifier) else "solids" if node.dimension == 3 else "profiles"
+    imports.add((module, f"{name} as {module}_{name}"))
+    return f"{module}_{name}"
+
+
+def _loops(each: List, index: int, first: int, materials: Sequence[int], imports: set[tuple[str, str]]) -> list[str]:
+    """The functions of a list: a leaf's value, the whole one's, and the nearest leaf's with its material."""
+    layout, stride, kinds = each.layout, each.stride, each.kinds
+    end = first + stride * len(each.leaves)
+    calls = [_imported(kind, kind.code, imports) for kind in kinds]
+    a = {"bare": "vec4f(head.w, 0.0, 0.0, 0.0)", "placed": "scene_rows[i + 1u]", "turned": "scene_rows[i + 4u]"}[layout]
+    b = {"bare": "vec4f(0.0)", "placed": "scene_rows[i + 2u]" if each.long else "vec4f(0.0)"}.get(
+        layout, "scene_rows[i + 5u]"
+    )
+    if layout == "turned":
+        place = "vec4f(p, 1.0) * mat3x4f(scene_rows[i], scene_rows[i + 1u], scene_rows[i + 2u])"
+        lines = [f"let q = {place};", "let head = scene_rows[i + 3u];"]
+        tag, factor = "bitcast<u32>(head.x)", "head.y * "
+    else:
+        lines = ["let head = scene_rows[i];", "let q = p - head.xyz;"]
+        tag, factor = "bitcast<u32>(head.w)", ""
+    values = [f"return {factor}{call}(q, {a}, {b});" for call in calls]
+    if len(calls) == 1:
+        lines += values
+    else:
+        cases = [f"{f'case {i}u' if i < len(values) - 1 else 'default'}: {{ {v} }}" for i, v in enumerate(values)]
+        lines += [f"switch {tag} & 255u {{", *(f"    {case}" for case in cases), "}"]
+    leaf = _indented(f"fn scene_leaf_{index}(p: vec3f, i: u32) -> f32", lines)
+    loop = f"for (var i = {first + stride}u; i < {end}u; i += {stride}u)"
+    value = f"scene_leaf_{index}(p, i)"
+    joined = f"min(d, {value})"
+    if each.smooth:
+        given = f"{number(each.smooth)}, {number(_SHARES[each.blend](each.smooth))}"
+        joined = f"scene_{each.blend}(d, {value}, {given})"
+    whole = _indented(
+        f"fn scene_list_{index}(p: vec3f) -> f32",
+        [f"var d = scene_leaf_{index}(p, {first}u);", f"{loop} {{", f"    d = {joined};", "}", "return d;"],
+    )
+    if len(materials) == 1:
+        return [leaf, whole]
+    where = "i + 3u].x" if layout == "turned" else "i].w"
+    cases = [
+        f"{f'case {i}u' if i < len(materials) - 1 else 'default'}: {{ m = {m}u; }}" for i, m in enumerate(materials)
+    ]
+    nearest = _indented(
+        f"fn scene_nearest_{index}(p: vec3f) -> vec2f",
+        [
+            f"var d = scene_leaf_{index}(p, {first}u);",
+            "var least = d;",
+            f"var at = {first}u;",
+            f"{loop} {{",
+            f"    let value = {value};",
+            f"    d = {joined.replace(value, 'value')};",
+            "    if value < least {",
+            "        least = value;",
+            "        at = i;",
+            "    }",
+            "}",
+            "var m = 0u;",
+            f"switch bitcast<u32>(scene_rows[{where.replace('i', 'at', 1)}) >> 8u {{",
+            *(f"    {case}" for case in cases),
+            "}",
+            "return vec2f(d, f32(m));",
+        ],
+    )
+    return [leaf, whole, nearest]
+
+
+def _indented(head: str, lines: Sequence[str]) -> str:
+    return "\n".join([f"{head} {{", *(f"    {line}" for line in lines), "}"])
 
 
 def _leaves(shape: Shape) -> int:

@@ -29,9 +29,13 @@ fn evaluate(x: vec4f) -> vec4f {
 """
 
 
-def evaluate(gpu: Gpu, code: Literal, points: NDArray[np.float64]) -> NDArray[np.float32]:
+def evaluate(
+    gpu: Gpu, code: Literal, points: NDArray[np.float64], moves: dict[str, Floats] | None = None
+) -> NDArray[np.float32]:
     rows = np.concatenate([points, np.zeros((len(points), 1))], axis=1).astype(np.float32)
-    return props.evaluate(gpu, f"test_literal_{next(_serial)}", code.text + RUN, rows)
+    text = ("import package::bindings::scene_rows;\n" if code.lists else "") + code.text + RUN
+    with gpu.buffer("test.rows", code.rows(moves), owner="test", element="vec4f") as listed:
+        return props.evaluate(gpu, f"test_literal_{next(_serial)}", text, rows, {"scene_rows": listed.read()})
 
 
 def some_points(count: int = 4000, reach: float = 3.0, seed: int = 7) -> NDArray[np.float64]:
@@ -156,3 +160,58 @@ def test_what_has_no_code_is_refused() -> None:
     with pytest.raises(ParameterError, match="none are given"):
         literal([])
     assert isinstance(Combination((sphere(),)).shapes[0], Primitive)
+
+
+def sequential(shapes: list[Shape], smooth: float, blend: str, points: Floats) -> Floats:
+    """A smooth union from the first to the last."""
+    pair = Combination((sphere(), sphere()), "union", smooth, blend)  # type: ignore[arg-type]
+    value = shapes[0](points)
+    for shape in shapes[1:]:
+        value = pair._least(value, shape(points))
+    return value
+
+
+@pytest.mark.parametrize("blend", BLENDS)
+@pytest.mark.parametrize("layout", ["bare", "placed", "turned"])
+def test_a_list_is_looped_over(gpu: Gpu, layout: str, blend: str) -> None:
+    rng = np.random.default_rng(5)
+    leaves: list[Shape] = []
+    for i in range(20):
+        leaf: Shape = sphere(rng.uniform(0.1, 0.4))
+        if layout != "bare":
+            leaf = (leaf if i % 3 else box(tuple(rng.uniform(0.1, 0.6, 3)))).material(RED if i % 2 else BLUE)
+        if layout == "turned":
+            leaf = leaf.rotate(rng.uniform(0, 6), tuple(rng.normal(size=3))).scale(rng.uniform(0.5, 2))
+        leaves.append(leaf.named("all").at(*rng.uniform(-1.5, 1.5, 3)))
+    shape = union(*leaves, smooth=0.15, blend=blend)  # type: ignore[arg-type]
+    code = literal([Implicit(shape.at(0.1)), Implicit(box(1).at(0, 0, 2))], loops=[0])
+    assert code.lists[0].layout == layout
+    points = some_points(2000)
+    inside = points - (0.1, 0, 0)
+    other = box(1).at(0, 0, 2)(points)
+    found = evaluate(gpu, code, points)
+    expected = np.minimum(sequential(leaves, 0.15, blend, inside), other)
+    np.testing.assert_allclose(found[:, 0], expected, rtol=2e-5, atol=2e-5)
+    if layout != "bare":
+        nearest = np.array([leaf(inside) for leaf in leaves]).argmin(axis=0)
+        listed = sequential(leaves, 0.15, blend, inside) < other
+        colors = [code.materials.index(RED if i % 2 else BLUE) for i in range(20)]
+        assert (found[listed, 1] == np.array(colors)[nearest][listed]).mean() > 0.999
+    moves = rng.uniform(-0.5, 0.5, (20, 3))
+    moved_leaves = [leaf.at(*by) for leaf, by in zip(leaves, moves, strict=True)]
+    found = evaluate(gpu, code, points, {"all": moves})
+    expected = np.minimum(sequential(moved_leaves, 0.15, blend, inside), other)
+    np.testing.assert_allclose(found[:, 0], expected, rtol=2e-5, atol=2e-5)
+
+
+def test_what_is_no_list_is_not_looped_over() -> None:
+    odd = union(sphere(), box() - sphere())
+    with pytest.raises(ParameterError, match="no union of leaves alone"):
+        literal([Implicit(odd)], loops=[0])
+    with pytest.raises(ParameterError, match="no union of leaves alone"):
+        literal([Implicit(sphere())], loops=[0])
+    code = literal([Implicit(union(sphere().named("a"), sphere().at(1)))], loops=[0])
+    with pytest.raises(ParameterError, match="no directions"):
+        code.rows({"a": rotation(1, (0, 0, 1))})
+    with pytest.raises(ParameterError, match=r"\(2, 2\) is not"):
+        code.rows({"a": np.zeros((2, 2))})
