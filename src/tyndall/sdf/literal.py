@@ -104,7 +104,7 @@ def literal(implicits: Sequence[Implicit], *, loops: Collection[int] = ()) -> Li
     if not implicits:
         raise ParameterError("implicits: none are given")
     materials: dict[Material, int] = {}
-    imports: set[tuple[str, str]] = set()
+    imports: dict[str, None] = {}
     blends: set[str] = set()
     lists: dict[int, List] = {}
     for i in sorted(loops):
@@ -128,7 +128,7 @@ def literal(implicits: Sequence[Implicit], *, loops: Collection[int] = ()) -> Li
         bodies.append((writer, writer.pairs(values, "union", 0.0, "polynomial")))
     (plain, distance), (tracked, nearest) = bodies
     parts = [
-        *(f"import package::sdf::{module}::{{{name}}};" for module, name in sorted(imports)),
+        *sorted(imports, key=lambda line: not line.startswith("import")),
         _STRUCT,
         *(_BLENDS[blend] for blend in sorted(blends)),
         *listed,
@@ -258,11 +258,14 @@ class _Value:
     material: str = "0u"
 
 
+_BORROWED = "4294967295u"  # of what cuts, and has no material of its own: that of what it cuts
+
+
 class _Writer:
     """The body of one function."""
 
     def __init__(
-        self, materials: dict[Material, int], imports: set[tuple[str, str]], blends: set[str], tracked: bool
+        self, materials: dict[Material, int], imports: dict[str, None], blends: set[str], tracked: bool
     ) -> None:
         self.lines: list[str] = []
         self._materials, self._imports, self._blends, self._tracked = materials, imports, blends, tracked
@@ -280,7 +283,9 @@ class _Writer:
             return _Value(f"{pair}.x", 1.0, f"u32({pair}.y)")
         return _Value(self._let("d", f"scene_list_{index}(p)"), 1.0, self._number_of(each.materials[0]))
 
-    def _number_of(self, material: Material) -> str:
+    def _number_of(self, material: Material | None) -> str:
+        if material is None:
+            return _BORROWED
         return f"{self._materials.setdefault(material, len(self._materials))}u"
 
     def _let(self, letter: str, expression: str) -> str:
@@ -312,7 +317,7 @@ class _Writer:
     def _function(self, node: Primitive | Modifier, name: str) -> str:
         return _imported(node, name, self._imports)
 
-    def _node(self, node: Shape, place: _Place, material: Material) -> _Value:
+    def _node(self, node: Shape, place: _Place, material: Material | None) -> _Value:
         match node:
             case Primitive():
                 call = f"{self._function(node, node.code)}({self._at(place)}, {fours(node.numbers)})"
@@ -332,7 +337,7 @@ class _Writer:
             return self.pairs([self._node(copy, place, material) for copy in copies()], "union", 0.0, "polynomial")
         raise ParameterError(f"{type(node).__name__} has no literal code")
 
-    def _modifier(self, node: Modifier, place: _Place, material: Material) -> _Value:
+    def _modifier(self, node: Modifier, place: _Place, material: Material | None) -> _Value:
         numbers = fours(node.numbers)
         if node.warps:
             inside = self._let("p", f"{self._function(node, f'{node.code}_enter')}({self._at(place)}, {numbers})")
@@ -345,7 +350,7 @@ class _Writer:
         name = self._let("d", f"{leave}({self.text(child)}, {self._at(place)}, {numbers})")
         return _Value(name, 1.0, child.material)
 
-    def _transformed(self, node: Transformed, place: _Place, material: Material) -> _Value:
+    def _transformed(self, node: Transformed, place: _Place, material: Material | None) -> _Value:
         inverse = np.linalg.inv(node.placement)
         linear = inverse[:3, :3]
         linear[np.abs(linear) < 1e-14 * np.abs(linear).max()] = 0
@@ -359,14 +364,15 @@ class _Writer:
         factor = child.factor * node.factor
         return _Value(child.name, 1.0 if abs(factor - 1) < 1e-9 else factor, child.material)
 
-    def _combination(self, node: Combination, place: _Place, material: Material) -> _Value:
-        values = [self._node(shape, place, material) for shape in node.shapes]
+    def _combination(self, node: Combination, place: _Place, material: Material | None) -> _Value:
+        cuts = node.operation == "subtraction"
+        values = [self._node(shape, place, None if cuts and i > 0 else material) for i, shape in enumerate(node.shapes)]
         how = node.smooth, node.blend
         if node.operation != "subtraction" or len(values) == 1:
             return self.pairs(values, node.operation, *how)
         first, *rest = values
         taken = self.pairs(rest, "union", *how)  # max over −d is −(min over d), smooth ones too
-        return self._pair(first, _Value(taken.name, -taken.factor, taken.material), "subtraction", *how)
+        return self._pair(first, taken, "subtraction", *how)
 
     def pairs(self, values: Sequence[_Value], operation: str, smooth: float, blend: str) -> _Value:
         """Neighbours by pairs until one is left, as :class:`Combination` has it."""
@@ -377,31 +383,48 @@ class _Writer:
         return values[0]
 
     def _pair(self, a: _Value, b: _Value, operation: str, smooth: float, blend: str) -> _Value:
-        least = operation == "union"
+        least, cut = operation == "union", -1 if operation == "subtraction" else 1
         if self._tracked and a.material != b.material:
             a, b = self._held(a), self._held(b)
         if smooth == 0:
-            result = f"{'min' if least else 'max'}({self.text(a)}, {self.text(b)})"
+            result = f"{'min' if least else 'max'}({self.text(a)}, {self.text(_Value(b.name, cut * b.factor))})"
         else:
             self._blends.add(blend)
-            signed = [self.text(v if least else _Value(v.name, -v.factor)) for v in (a, b)]
+            signs = (1, 1) if least else (-1, -cut)
+            signed = [self.text(_Value(v.name, sign * v.factor)) for v, sign in zip((a, b), signs, strict=True)]
             given = f"{number(smooth)}, {number(_SHARES[blend](smooth))}"
             result = f"{'' if least else '-'}scene_{blend}({', '.join(signed)}, {given})"
-        material = a.material
-        if self._tracked and a.material != b.material and operation != "subtraction":
-            nearer = f"{b.name} {'<' if least else '>'} {a.name}"
-            material = self._let("m", f"select({a.material}, {b.material}, {nearer})")
+        material, other = a.material, b.material
+        if operation == "subtraction" and other == _BORROWED:
+            other = material
+        elif self._tracked and operation == "subtraction" and other.startswith("m"):
+            other = self._let("m", f"select({other}, {material}, {other} == {_BORROWED})")
+        if self._tracked and material != other:
+            first = f"-{b.name}" if operation == "subtraction" else b.name
+            nearer = f"{first} {'<' if least else '>'} {a.name}"
+            material = self._let("m", f"select({material}, {other}, {nearer})")
         return _Value(self._let("d", result), 1.0, material)
 
 
-def _imported(node: Primitive | Modifier, name: str, imports: set[tuple[str, str]]) -> str:
-    """The name that a node's function is imported by."""
-    module = "modifiers" if isinstance(node, Modifier) else "solids" if node.dimension == 3 else "profiles"
-    imports.add((module, f"{name} as {module}_{name}"))
-    return f"{module}_{name}"
+def _imported(node: Primitive | Modifier, name: str, imports: dict[str, None]) -> str:
+    """The name of a node's function, and among ``imports`` the line that brings it: an import, or a user's text.
+
+    Raises:
+        ParameterError: it reads samples.
+    """
+    if getattr(node, "payload", None) is not None:
+        raise ParameterError(f"{type(node).__name__} has samples, and they are no literal code")
+    if hasattr(node, "wesl"):  # a user's, which is text of its own
+        imports[str(node.wesl)] = None
+        return name.replace(node.code, str(node.function), 1)  # type: ignore[union-attr]
+    default = "modifiers" if isinstance(node, Modifier) else "solids" if node.dimension == 3 else "profiles"
+    path = getattr(node, "module", None) or f"package::sdf::{default}"
+    alias = f"{path.rpartition('::')[2]}_{name}"
+    imports[f"import {path}::{{{name} as {alias}}};"] = None
+    return alias
 
 
-def _loops(each: List, index: int, first: int, materials: Sequence[int], imports: set[tuple[str, str]]) -> list[str]:
+def _loops(each: List, index: int, first: int, materials: Sequence[int], imports: dict[str, None]) -> list[str]:
     """The functions of a list: a leaf's value, the whole one's, and the nearest leaf's with its material."""
     layout, stride, kinds = each.layout, each.stride, each.kinds
     end = first + stride * len(each.leaves)

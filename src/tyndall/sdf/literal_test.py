@@ -104,15 +104,26 @@ def test_the_material_is_that_of_the_nearest_part(gpu: Gpu) -> None:
     assert (found[found[:, 1] == numbers[2], 3] == 0.25).all()
 
 
-def test_an_intersection_shows_the_greater_and_a_subtraction_the_first(gpu: Gpu) -> None:
+def test_what_cuts_shows_where_it_has_a_material_of_its_own(gpu: Gpu) -> None:
     parts = [box(2).material(RED), sphere(1.2).material(BLUE)]
     points = some_points(reach=1.5)
     both = literal([Implicit(intersection(*parts))])
     expected = [both.materials.index(m) for m in (RED, BLUE)]
     greater = parts[1](points) > parts[0](points)
     np.testing.assert_array_equal(evaluate(gpu, both, points)[:, 1], np.where(greater, expected[1], expected[0]))
-    less = literal([Implicit(subtraction(*parts))])
-    assert (evaluate(gpu, less, points)[:, 1] == less.materials.index(RED)).all()
+    cut = -parts[1](points) > parts[0](points)
+    for smooth in (0, 0.05):
+        less = literal([Implicit(subtraction(*parts, smooth=smooth))])
+        expected = [less.materials.index(m) for m in (RED, BLUE)]
+        np.testing.assert_array_equal(evaluate(gpu, less, points)[:, 1], np.where(cut, expected[1], expected[0]))
+    plain = sphere(0.6).at(1)
+    both = union(sphere(1.2).material(BLUE), plain)
+    bare = literal([Implicit(subtraction(parts[0], both), material=BLUE)])
+    found = evaluate(gpu, bare, points)[:, 1] == bare.materials.index(BLUE)
+    inner = (-both(points) > parts[0](points)) & (sphere(1.2)(points) < plain(points))
+    np.testing.assert_array_equal(found, inner)
+    less = literal([Implicit(subtraction(parts[0], sphere(1.2)), material=BLUE)])
+    assert less.materials == (RED,)
 
 
 def body(code: Literal) -> list[str]:
