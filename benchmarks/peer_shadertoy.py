@@ -3,9 +3,9 @@
     python benchmarks/peer_shadertoy.py [--scene NAME] [--size 1920x1080] [--seconds 5] [--picture FILE.png]
 
 wgpu-shadertoy runs shaders of shadertoy.com, and WGSL after the same rules: one function from a pixel to its colour,
-in a fragment shader. It gets the plain loop of :mod:`tyndall.lab.baseline`, with the camera, the lights and the settings
-as constants in its text, as nothing can be bound. It compiles with wgpu's own limits on loops, which Tyndall's shaders
-do without.
+in a fragment shader. It gets the plain loop of :mod:`tyndall.lab.baseline`, with the camera, the lights and the
+settings as constants in its text, as nothing can be bound. It compiles with wgpu's own limits on loops, which
+Tyndall's shaders do without.
 
 Its release 0.2.0 asks for windows that wgpu no longer has ("No module named 'wgpu.gui'" with wgpu 0.32): two modules of
 that name, with a canvas that only holds a texture, are put in its way. It never opens a window or a connection here:

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -70,7 +71,7 @@ class List:
             return None
         return cls(leaves, top.smooth, top.blend)
 
-    @property
+    @cached_property
     def kinds(self) -> list[Primitive]:
         """A leaf of each kind, in the order of their numbers."""
         found: dict[type[Primitive], Primitive] = {}
@@ -78,12 +79,12 @@ class List:
             found.setdefault(type(leaf.primitive), leaf.primitive)
         return list(found.values())
 
-    @property
+    @cached_property
     def materials(self) -> list[Material]:
         """Each material once, in the order of their numbers."""
         return list(dict.fromkeys(leaf.material for leaf in self.leaves))
 
-    @property
+    @cached_property
     def layout(self) -> str:
         """ "bare", "placed" or "turned"; see the module."""
         matrices = self._matrices({})
@@ -98,10 +99,10 @@ class List:
     @property
     def stride(self) -> int:
         """Rows of a leaf."""
-        return {"bare": 1, "placed": 2 + self.long, "turned": 6}[self.layout]
+        return {"bare": 1, "placed": 2 + self.is_long, "turned": 6}[self.layout]
 
-    @property
-    def long(self) -> bool:
+    @cached_property
+    def is_long(self) -> bool:
         """Whether a leaf has more than four numbers."""
         return max(len(leaf.primitive.numbers) for leaf in self.leaves) > 4
 
@@ -115,36 +116,58 @@ class List:
             ParameterError: another shape of array, or a turn where the list's layout has only places.
         """
         matrices = self._matrices(moves or {})
-        count, layout = len(self.leaves), self.layout
-        rows = np.zeros((count, self.stride, 4), np.float32)
+        layout = self.layout
         if layout != "turned" and moves and not np.allclose(matrices[:, :3, :3], np.eye(3), atol=1e-6):
             raise ParameterError("moves: this list's leaves have places and no directions")
-        numbers = np.zeros((count, 8), np.float32)
+        rows = self._still.copy()
+        if layout == "turned":
+            rows[:, :3] = np.linalg.inv(matrices)[:, :3]
+        else:
+            rows[:, 0, :3] = matrices[:, :3, 3]
+        return rows.reshape(-1, 4)
+
+    @cached_property
+    def _still(self) -> NDArray[np.float32]:
+        """(count, stride, 4): the rows without their places."""
+        rows = np.zeros((len(self.leaves), self.stride, 4), np.float32)
+        numbers = np.zeros((len(self.leaves), 8), np.float32)
         for row, leaf in zip(numbers, self.leaves, strict=True):
             row[: len(leaf.primitive.numbers)] = leaf.primitive.numbers
-        if layout == "bare":
-            rows[:, 0, :3], rows[:, 0, 3] = matrices[:, :3, 3], numbers[:, 0]
-            return rows.reshape(-1, 4)
+        if self.layout == "bare":
+            rows[:, 0, 3] = numbers[:, 0]
+            return rows
         codes, materials = [type(kind) for kind in self.kinds], self.materials
         bits = [codes.index(type(leaf.primitive)) | materials.index(leaf.material) << 8 for leaf in self.leaves]
         tags = np.array(bits, np.uint32).view(np.float32)
-        if layout == "placed":
-            rows[:, 0, :3], rows[:, 0, 3], rows[:, 1] = matrices[:, :3, 3], tags, numbers[:, :4]
-            if self.long:
+        if self.layout == "placed":
+            rows[:, 0, 3], rows[:, 1] = tags, numbers[:, :4]
+            if self.is_long:
                 rows[:, 2] = numbers[:, 4:]
-            return rows.reshape(-1, 4)
-        rows[:, :3] = np.linalg.inv(matrices)[:, :3]
-        rows[:, 3, 0], rows[:, 3, 1] = tags, [leaf.factor for leaf in self.leaves]
-        rows[:, 4], rows[:, 5] = numbers[:, :4], numbers[:, 4:]
-        return rows.reshape(-1, 4)
+        else:
+            rows[:, 3, 0], rows[:, 3, 1] = tags, [leaf.factor for leaf in self.leaves]
+            rows[:, 4], rows[:, 5] = numbers[:, :4], numbers[:, 4:]
+        return rows
+
+    @cached_property
+    def _placed(self) -> tuple[Floats, Floats]:
+        """(N, 4, 4) transforms outside and inside of the names."""
+        return np.array([leaf.outer for leaf in self.leaves]), np.array([leaf.inner for leaf in self.leaves])
+
+    @cached_property
+    def _named(self) -> dict[str, NDArray[np.intp]]:
+        """Numbers of the leaves of each name."""
+        found: dict[str, list[int]] = {}
+        for i, leaf in enumerate(self.leaves):
+            if leaf.name is not None:
+                found.setdefault(leaf.name, []).append(i)
+        return {name: np.array(at) for name, at in found.items()}
 
     def _matrices(self, moves: Mapping[str, ArrayLike]) -> Floats:
         """(N, 4, 4) placements."""
-        inner = np.array([leaf.inner for leaf in self.leaves])
-        outer = np.array([leaf.outer for leaf in self.leaves])
+        outer, inner = self._placed
         for name, given in moves.items():
-            at = [i for i, leaf in enumerate(self.leaves) if leaf.name == name]
-            if at:
+            if (at := self._named.get(name)) is not None:
+                inner = inner.copy()
                 inner[at] = as_matrices(given, len(at)) @ inner[at]
         placed: Floats = outer @ inner
         return placed

@@ -430,7 +430,7 @@ def _loops(each: List, index: int, first: int, materials: Sequence[int], imports
     end = first + stride * len(each.leaves)
     calls = [_imported(kind, kind.code, imports) for kind in kinds]
     a = {"bare": "vec4f(head.w, 0.0, 0.0, 0.0)", "placed": "scene_rows[i + 1u]", "turned": "scene_rows[i + 4u]"}[layout]
-    b = {"bare": "vec4f(0.0)", "placed": "scene_rows[i + 2u]" if each.long else "vec4f(0.0)"}.get(
+    b = {"bare": "vec4f(0.0)", "placed": "scene_rows[i + 2u]" if each.is_long else "vec4f(0.0)"}.get(
         layout, "scene_rows[i + 5u]"
     )
     if layout == "turned":
