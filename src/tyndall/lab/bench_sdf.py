@@ -52,6 +52,7 @@ from tyndall.lab.stage import adapter_name, driver_name
 from tyndall.scene.model import Scene
 from tyndall.sdf import sphere, union
 from tyndall.sdf.field import Field
+from tyndall.techniques import FAMILIES
 
 NAME = "sdf"
 PARTS = ("scenes", "swarm", "edits", "first", "agreement")
@@ -455,7 +456,8 @@ def _move_all(renderer: Renderer, moves: Mapping[str, Any]) -> None:
 
 def techniques() -> dict[str, str]:
     """Those of our frame, by family."""
-    return dict(FRAME)
+    instead = {"field": "shadow_map", "field_ao": "none"}
+    return {family: name if name in FAMILIES[family].members else instead[name] for family, name in FRAME.items()}
 
 
 def facts(scene: Scene) -> Row:

@@ -21,6 +21,8 @@ What is written is what a careful person writes:
   one that turns by right angles a swizzle, one that turns about an axis four products; a turn that several leaves
   share is done once, and so is a place that several ask at;
 - values are scaled where a transform scales, and only there;
+- a shape that is repeated is written once, at the place in its own cell, and once more for the neighbour towards the
+  place on each axis, unless it is its own mirror image there and no larger than its cell;
 - smooth unions of the polynomial kind are written as ``min(a, b) − max(k − |a − b|, 0)² / 4k``, which is the same as
   S5's form, by pairs in the same order as in :class:`~tyndall.sdf.shape.Combination`.
 
@@ -36,6 +38,7 @@ The text declares, and a shader that has it among its bindings may import:
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
@@ -45,8 +48,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tyndall.gpu.params import ParameterError
-from tyndall.scene.model import Implicit, Material
+from tyndall.scene.model import Implicit, Material, box_corners
 from tyndall.sdf.listed import List
+from tyndall.sdf.repetition import Polar, Repeated
 from tyndall.sdf.shape import Combination, Floats, Modifier, Named, Painted, Primitive, Shape, Transformed
 
 _STRUCT = """struct SceneSurface {
@@ -332,6 +336,10 @@ class _Writer:
                 return self._node(node.shape, place, node.surface)
             case Named():
                 return self._node(node.shape, place, material)
+            case Repeated() if _is_within(node.shape, node.spacing, node.counts):
+                return self._repeated(node, place, material)
+            case Polar() if (middle := _sector(node)) is not None:
+                return self._polar(node, *middle, place, material)
         copies = getattr(node, "copies", None)
         if copies is not None:
             return self.pairs([self._node(copy, place, material) for copy in copies()], "union", 0.0, "polynomial")
@@ -373,6 +381,44 @@ class _Writer:
         first, *rest = values
         taken = self.pairs(rest, "union", *how)  # max over −d is −(min over d), smooth ones too
         return self._pair(first, taken, "subtraction", *how)
+
+    def _repeated(self, node: Repeated, place: _Place, material: Material | None) -> _Value:
+        """The copy in the place's own cell, and its neighbours' towards the place."""
+        several = np.array(node.counts) > 1
+        spacing, half = np.where(several, node.spacing, 0.0), np.where(several, node.half, 0.0)
+        p = self._at(place)
+        last = vector([n - 1 for n in node.counts])
+        parts = [vector(v) for v in (half, np.where(several, 1 / np.array(node.spacing), 0.0), spacing, half)]
+        cell = self._let("c", f"clamp(round(({p} + {parts[0]}) * {parts[1]}), vec3f(0.0), {last})")
+        own = self._let("p", f"{p} - ({cell} * {parts[2]} - {parts[3]})")
+        narrow = [s == 0 or _is_mirror(node.shape, axis, s) for axis, s in enumerate(spacing)]
+        if all(narrow):
+            return self._node(node.shape, _Place(own, np.eye(4)), material)
+        beside = self._let("c", f"clamp({cell} + sign({own}), vec3f(0.0), {last})")
+        values = []
+        for choice in itertools.product(*[(cell,) if one else (cell, beside) for one in narrow]):
+            at = f"vec3f({', '.join(f'{name}.{axis}' for name, axis in zip(choice, 'xyz', strict=True))})"
+            inside = own if set(choice) == {cell} else self._let("p", f"{p} - ({at} * {parts[2]} - {parts[3]})")
+            values.append(self._node(node.shape, _Place(inside, np.eye(4)), material))
+        return self.pairs(values, "union", 0.0, "polynomial")
+
+    def _polar(
+        self, node: Polar, frame: Floats, middle: float, mirrored: bool, place: _Place, material: Material | None
+    ) -> _Value:
+        """The copy in the place's own sector, and the next one towards the place."""
+        step = 2 * math.pi / node.number
+        about = _Place(place.base, np.linalg.inv(frame) @ place.matrix)
+        p = self._at(about)
+        turn = self._let("a", f"(atan2({p}.y, {p}.x) - {number(middle)}) * {number(1 / step)}")
+        own = self._let("a", f"round({turn})")
+        values = []
+        for i in range(1 if mirrored else 2):
+            sector = own if i == 0 else f"({own} + sign({turn} - {own}))"
+            angle = self._let("a", f"{number(step)} * {sector}")
+            pair = self._let("a", f"vec2f(cos({angle}), sin({angle}))")
+            turned = f"vec3f(dot({pair}, {p}.xy), {pair}.x * {p}.y - {pair}.y * {p}.x, {p}.z)"
+            values.append(self._node(node.shape, _Place(self._let("p", turned), frame), material))
+        return self.pairs(values, "union", 0.0, "polynomial")
 
     def pairs(self, values: Sequence[_Value], operation: str, smooth: float, blend: str) -> _Value:
         """Neighbours by pairs until one is left, as :class:`Combination` has it."""
@@ -489,6 +535,61 @@ def _loops(each: List, index: int, first: int, materials: Sequence[int], imports
 
 def _indented(head: str, lines: Sequence[str]) -> str:
     return "\n".join([f"{head} {{", *(f"    {line}" for line in lines), "}"])
+
+
+def _is_within(shape: Shape, spacing: Sequence[float], counts: Sequence[int]) -> bool:
+    """Whether no copy reaches through its neighbours' cells, so that two on each axis are enough."""
+    low, high = shape.box
+    reach, several = np.maximum(-low, high), np.array(counts) > 1
+    return bool((reach <= np.array(spacing))[several].all())
+
+
+def _is_mirror(shape: Shape, axis: int, spacing: float) -> bool:
+    """Whether a shape fits its cell, and is its own mirror image; by trial."""
+    low, high = shape.box
+    if max(-low[axis], high[axis]) > 0.5 * spacing * (1 + 1e-9):
+        return False
+    points = _trial(shape)
+    mirrored = points.copy()
+    mirrored[:, axis] *= -1
+    return bool(np.allclose(shape(points), shape(mirrored), rtol=0, atol=1e-9))
+
+
+def _trial(shape: Shape) -> Floats:
+    low, high = (np.clip(np.nan_to_num(corner), -1e3, 1e3) for corner in shape.box)
+    margin = 0.2 * (high - low) + 1e-3
+    points: Floats = np.random.default_rng(0).uniform(low - margin, high + margin, (200, 3))
+    return points
+
+
+def _sector(node: Polar) -> tuple[Floats, float, bool] | None:
+    """The axis' frame as a 4×4 matrix whose Z it is, the direction of the shape about it, and whether it fits a sector
+    and is its own mirror image there; None where it reaches through its neighbours' sectors.
+    """
+    z = np.array(node.axis) / np.linalg.norm(node.axis)
+    x = np.cross((0.0, 1.0, 0.0) if abs(z[1]) < 0.9 else (1.0, 0.0, 0.0), z)
+    x /= np.linalg.norm(x)
+    if abs(z[2]) == 1:
+        x = np.array([1.0, 0.0, 0.0])
+    frame = np.eye(4)
+    frame[:3, :3] = np.stack([x, np.cross(z, x), z], axis=1)
+    low, high = node.shape.box
+    if not (np.isfinite(low).all() and np.isfinite(high).all()):
+        return None
+    corners = box_corners(low, high) @ frame[:3, :3]
+    centre = corners.mean(axis=0)
+    middle = math.atan2(centre[1], centre[0])
+    turned = np.array([[math.cos(middle), math.sin(middle)], [-math.sin(middle), math.cos(middle)]]) @ corners[:, :2].T
+    half = math.pi / node.number
+    reach = np.abs(np.arctan2(turned[1], turned[0])).max()
+    if turned[0].min() <= 0 or reach > 2 * half:
+        return None
+    points = _trial(node.shape)
+    normal = frame[:3, :3] @ np.array([-math.sin(middle), math.cos(middle), 0.0])
+    mirrored = points - 2 * np.outer(points @ normal, normal)
+    fits = np.abs(turned[1]).max() <= math.hypot(*centre[:2]) * math.tan(half) * 1.02
+    same = np.allclose(node.shape(points), node.shape(mirrored), rtol=0, atol=1e-9)
+    return frame, middle, bool(fits and same)
 
 
 def _leaves(shape: Shape) -> int:

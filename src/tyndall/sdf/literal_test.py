@@ -14,8 +14,9 @@ from tyndall.gpu.params import ParameterError
 from tyndall.scene.model import Implicit, Material
 from tyndall.sdf.literal import Literal, literal, moved, number
 from tyndall.sdf.modifiers import Round
+from tyndall.sdf.profiles import PROFILES
 from tyndall.sdf.shape import Combination, Floats, Primitive, Shape, intersection, rotation, subtraction, union
-from tyndall.sdf.solids import box, sphere
+from tyndall.sdf.solids import SOLIDS, box, sphere
 
 RED, BLUE = Material("red", (1, 0, 0, 1)), Material("blue", (0, 0, 1, 1), metallic=1.0, emissive=(1, 2, 3))
 _serial = itertools.count()
@@ -226,3 +227,40 @@ def test_what_is_no_list_is_not_looped_over() -> None:
         code.rows({"a": rotation(1, (0, 0, 1))})
     with pytest.raises(ParameterError, match=r"\(2, 2\) is not"):
         code.rows({"a": np.zeros((2, 2))})
+
+
+def test_every_kind_of_node_has_code(gpu: Gpu) -> None:
+    """One of each primitive and modifier, side by side in one scene a batch, held against float64."""
+    kinds = [*SOLIDS.values(), *PROFILES.values()]
+    shapes: list[Shape] = [cls() if cls.dimension == 3 else cls().extrude(0.4) for cls in kinds]
+    lump = union(sphere(0.4).at(0.3), box((0.3, 0.5, 0.2)), smooth=0.1)
+    shapes += [
+        lump.twist(0.4), lump.bend(0.2), lump.shell(0.05), lump.round(0.1), lump.mirror("xy"), lump.displace(0.02, 0.7),
+        lump.noise(0.02, 0.3), lump.repeat(2.5), lump.repeat((3, 3, 0), mirrored=True), lump.elongate(0.3, 0.1),
+        PROFILES["circle"]().revolve(1.0),
+    ]  # fmt: skip
+    points = some_points(300, 1.5)
+    for batch in range(0, len(shapes), 20):
+        chosen = shapes[batch : batch + 20]
+        expected = np.min([shape(points) for shape in chosen], axis=0)
+        found = evaluate(gpu, literal([Implicit(shape) for shape in chosen]), points)[:, 0]
+        np.testing.assert_allclose(found, expected, rtol=2e-4, atol=2e-4)
+
+
+@pytest.mark.parametrize("shape", [sphere(0.3), union(sphere(0.2), sphere(0.1).at(0.25, 0.1, 0.05))])
+def test_what_is_repeated_is_written_once_or_twice_an_axis(gpu: Gpu, shape: Shape) -> None:
+    one = shape.count == 1
+    row = shape.repeat((0.8, 0.9, 1.0), (5, 1, 2)).at(0.1)
+    ring = shape.at(1.2, 0, 0.2).polar(9, (0, 1, 0))
+    points = some_points(2000)
+    for repeated, calls in ((row, 1 if one else 8), (ring, 1 if one else 4)):
+        code = literal([Implicit(repeated)])
+        assert sum("solids_sphere(" in line for line in body(code)) == calls
+        np.testing.assert_allclose(evaluate(gpu, code, points)[:, 0], repeated(points), rtol=2e-5, atol=2e-5)
+
+
+def test_what_reaches_far_is_written_as_its_copies(gpu: Gpu) -> None:
+    wide, points = sphere(1.5).repeat((1, 1, 1), (3, 1, 1)), some_points(500)
+    code = literal([Implicit(wide)])
+    assert sum("solids_sphere(" in line for line in body(code)) == 3
+    np.testing.assert_allclose(evaluate(gpu, code, points)[:, 0], wide(points), rtol=2e-5, atol=2e-5)
