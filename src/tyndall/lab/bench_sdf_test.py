@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -49,6 +50,7 @@ def made(name: str) -> Scene:
         camera=Camera((0, 1, 3), (0, 0, 0)),
         implicits=(Implicit(union(*leaves, smooth=0.05)), Implicit(box((4, 0.1, 4)).at(0, -1))),
         motion=motion,
+        looks={"shadow_map": {"size": 32}},
         name=name.partition(":")[0],
     )
 
@@ -94,11 +96,8 @@ def test_everything_is_measured(gpu: Gpu, small: object, tmp_path: Path) -> None
         assert f"### {title}" in text
     assert json.loads((tmp_path / "sdf.json").read_text(encoding="utf-8")) == document
     assert (tmp_path / "sdf.md").read_text(encoding="utf-8") == text
-    for line in text.splitlines():
-        if line.startswith("| ---"):
-            columns = line.count("|")
-        elif line.startswith("|") and "columns" in locals():
-            assert line.count("|") >= 3
+    for table in re.findall(r"(?:^\|.*\n)+", text, re.MULTILINE):
+        assert len({line.count("|") for line in table.splitlines()}) == 1, table
     goals = bench_sdf_tables.markdown({**document, "adapter_type": "DiscreteGPU"})
     assert "`snail` over the plain loop" in goals
     assert "10,000 moving" not in goals
@@ -126,7 +125,7 @@ def test_a_slow_loop_is_measured_smaller(gpu: Gpu, small: object, monkeypatch: p
 
 
 def test_a_process_of_its_own_draws_and_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A bundled scene's name is all that the other process gets; it is told what went wrong there, or that it was late."""
+    """A bundled scene's name is all that the other process gets; it is told what went wrong, or that it was late."""
     assert "no scene 'nowhere'" in in_a_process(Order("nowhere", size=(8, 6)), keep_compiled=False)["failed"]
     assert in_a_process(Order("nowhere"), timeout=0.01)["failed"] == "no picture within 0.01 s"
     assert "–" in bench_sdf_tables._loop(None)
