@@ -1,4 +1,4 @@
-"""The benchmark of implicit surfaces measures what it says, keeps going where something fails, and tells it in tables."""
+"""The benchmark of implicit surfaces measures what it says, and keeps going where something fails."""
 
 from __future__ import annotations
 
@@ -125,7 +125,7 @@ def test_a_slow_loop_is_measured_smaller(gpu: Gpu, small: object, monkeypatch: p
 
 
 def test_a_process_of_its_own_draws_and_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A bundled scene's name is all that the other process gets; it is told what went wrong, or that it was late."""
+    """A scene's name is all that the other process gets; one is told what went wrong, or that it was late."""
     assert "no scene 'nowhere'" in in_a_process(Order("nowhere", size=(8, 6)), keep_compiled=False)["failed"]
     assert in_a_process(Order("nowhere"), timeout=0.01)["failed"] == "no picture within 0.01 s"
     assert "–" in bench_sdf_tables._loop(None)
