@@ -44,6 +44,7 @@ from numpy.typing import NDArray
 
 from tyndall.gpu.params import ParameterError
 from tyndall.scene.model import Material
+from tyndall.sdf.repetition import Repetition
 from tyndall.sdf.shape import (
     Combination,
     Floats,
@@ -307,11 +308,13 @@ class _Compiler:
             case Modifier():
                 self._modifier(shape, c)
                 self._join(join, blend, k, shape.lipschitz * c.stretch)
-            case _ if hasattr(shape, "copies"):
-                self._emit(Combination(tuple(shape.copies())), c, join, blend, k)
-            case _:
-                self._forever(shape, c)
+            case Repetition() if not shape.opaque:
+                self._emit(Combination(shape.copies()), c, join, blend, k)
+            case Repetition():
+                self._scope(Combination(shape.copies()), c, flags=OPAQUE)
                 self._join(join, blend, k, shape.lipschitz * c.stretch)
+            case _:
+                raise ParameterError(f"shape: a {type(shape).__name__} has no program")
 
     def _put(self, *rows: Sequence[float]) -> int:
         at = len(self._rows)
@@ -427,12 +430,12 @@ class _Compiler:
             self._join(inner, kind, width, max(shape.lipschitz for shape in shapes) * c.stretch)
         self._join(join, blend, k, max(shape.lipschitz for shape in shapes) * c.stretch)
 
-    def _scope(self, shape: Shape, c: _Context, name: str = "") -> None:
+    def _scope(self, shape: Shape, c: _Context, name: str = "", flags: int = 0) -> None:
         """A shape inside its pending transform as instructions of their own; a named one always has them."""
         factor = c.factor
         slot = self._put(*np.linalg.inv(c.matrix)[:3], (factor, shape.lipschitz * c.stretch, 0, 0))
         entry = len(self._words)
-        self._word(ENTER, AFFINE, flags=PLACED, slot=slot)
+        self._word(ENTER, AFFINE, flags=PLACED | flags, slot=slot)
         self._entered()
         inside = replace(c, matrix=np.eye(4), factor=1.0, stretch=c.stretch / factor, name="", before=None, margin=-1.0)
         self._emit(shape, inside, PUSH, HARD, 0.0)
@@ -440,7 +443,7 @@ class _Compiler:
         if name:
             part = Part(slot, entry, len(self._words), False, c.matrix, np.eye(4), factor, shape)
             self._names.setdefault(name, []).append(part)
-        self._word(LEAVE, AFFINE, flags=PLACED, slot=slot)
+        self._word(LEAVE, AFFINE, flags=PLACED | flags, slot=slot)
 
     def _entered(self) -> None:
         self._places += 1
@@ -466,9 +469,6 @@ class _Compiler:
             self._places -= 1
         if shape.warps or shape.adjusts:
             self._word(LEAVE, code, flags=PLACED if shape.warps else 0, slot=slot)
-
-    def _forever(self, shape: Shape, c: _Context) -> None:
-        raise ParameterError(f"shape: a {type(shape).__name__} has no program")
 
 
 def _cutting(c: _Context, cuts: bool) -> _Context:
