@@ -8,6 +8,8 @@ array([0.5 , 1.25])
 :mod:`tyndall.sdf.shape` says what a shape is and what can be done to it.
 """
 
+from tyndall.sdf.grid import Grid as Grid
+from tyndall.sdf.grid import from_mesh as from_mesh
 from tyndall.sdf.profiles import PROFILES as PROFILES
 from tyndall.sdf.profiles import arc as arc
 from tyndall.sdf.profiles import bar as bar
