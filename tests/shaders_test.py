@@ -29,6 +29,7 @@ from tyndall.scene.model import (
     Texture,
 )
 from tyndall.sdf import box, sphere, union
+from tyndall.sdf.snippets import Snippet, SnippetSource, evaluate
 from tyndall.techniques import FAMILIES
 from tyndall.techniques.contract import Unsupported
 from tyndall.techniques.shadow.depth_maps import IN_WORDS
@@ -111,6 +112,7 @@ def test_every_entry_point_compiles_and_is_used(gpu: Gpu, monkeypatch: pytest.Mo
         world.move({0: _mirror})
         cast(gpu, world, [[0, 0, 0]], [[0, 0, -1]])
         blocked(gpu, world, [[0, 0, 0]], [[0, 0, -1]])
+    evaluate(gpu, Snippet(SnippetSource("plane", "fn plane(p: vec3f) -> f32 { return p.y; }")), np.zeros((1, 3)))
     monkeypatch.setattr("tyndall.lab.busy._ROUNDS", 2)
     monkeypatch.setitem(gpu.adapter_info, "adapter_type", "DiscreteGPU")
     with Busy(gpu) as busy:

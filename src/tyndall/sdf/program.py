@@ -89,11 +89,15 @@ class Kinds:
             self.version += 1
         return known[key][0]
 
+    def sources(self) -> list[Any]:
+        """The texts among them that a user wrote (:class:`~tyndall.sdf.snippets.SnippetSource`)."""
+        shapes: list[Any] = [shape for _, shape in (*self._primitives.values(), *self._modifiers.values())]
+        return [shape.source for shape in shapes if getattr(shape, "untrusted", False)]
+
     @property
     def is_trusted(self) -> bool:
         """Whether none of them is a user's code."""
-        shapes = [shape for _, shape in (*self._primitives.values(), *self._modifiers.values())]
-        return not any(getattr(shape, "untrusted", False) for shape in shapes)
+        return not self.sources()
 
     def wesl(self) -> str:
         """Text for the bindings module: ``implicit_primitive``, its numbers in the slots or given, ``implicit_enter`` and
