@@ -144,12 +144,24 @@ def _payload(shape: Primitive) -> NDArray[np.float32] | None:
     return getattr(shape, "payload", None)
 
 
+_CASES = 32  # of one switch: Mesa's software adapter makes a nest of them, and gives zeros below 80 levels
+
+
 def _switch(signature: str, cases: Sequence[tuple[int, str]], otherwise: str) -> str:
-    lines = [f"case {code}u: {{ return {value}; }}" for code, value in cases]
-    body = (
-        f"switch code {{ {' '.join(lines)} default: {{ return {otherwise}; }} }}" if cases else f"return {otherwise};"
-    )
-    return f"fn {signature} {{ {body} }}"
+    """A function of ``code``, whose cases are numbered from 0 but for gaps: one switch, or one of several of them."""
+    if len(cases) <= _CASES:
+        lines = [f"case {code}u: {{ return {value}; }}" for code, value in cases]
+        body = f"switch code {{ {' '.join(lines)} default: {{ return {otherwise}; }} }}"
+        return f"fn {signature} {{ {body if cases else f'return {otherwise};'} }}"
+    name, arguments = signature.partition("(")[::2]
+    names = ", ".join(part.partition(":")[0].strip() for part in arguments.partition(")")[0].split(","))
+    texts, calls = [], []
+    for i in range(0, len(cases), _CASES):
+        texts.append(_switch(f"{name}_{i // _CASES}({arguments}", cases[i : i + _CASES], otherwise))
+        calls.append(
+            f"if code <= {cases[min(i + _CASES, len(cases)) - 1][0]}u {{ return {name}_{i // _CASES}({names}); }}"
+        )
+    return "\n".join([*texts, f"fn {signature} {{ {' '.join(calls)} return {otherwise}; }}"])
 
 
 @dataclass(frozen=True, eq=False)
