@@ -47,3 +47,18 @@ def test_a_hundred_kinds_are_told_apart(gpu: Gpu) -> None:
     wanted = np.arange(103) + 0.25
     wanted[[31, 40, 101, 102]] = -1
     np.testing.assert_array_equal(got, wanted)
+
+
+def test_what_is_repeated_for_ever_is_pruned_as_a_whole(gpu: Gpu) -> None:
+    """A copy reaches through its cell's wall, at which the two copies that are asked for change places."""
+    shape = sdf.sphere(0.3).at(0.3).repeat((0.9, 0, 0)) & sdf.box((2.7, 0.6, 0.6))
+    rng = np.random.default_rng(0)
+    wall = np.array([0.45, 0, 0]) + rng.normal(size=(600, 3)) * [0.02, 1, 1]  # A's sphere goes through x = 0.45
+    around = wall[:, 1:] / np.linalg.norm(wall[:, 1:], axis=1)[:, None]
+    reach = np.sqrt(0.3**2 - (wall[:, :1] - 0.3) ** 2)
+    at = np.concatenate([wall[:, :1], around * (reach + rng.normal(0, 0.004, reach.shape))], axis=1).astype(np.float32)
+    with Field(gpu, [Implicit(shape)]) as field:
+        field.update()
+        inputs = np.concatenate([at, np.zeros((len(at), 1), np.float32)], axis=1)
+        got = props.evaluate(gpu, "test_forever", VALUE, inputs, scope=field.bindings)[:, 0]
+    np.testing.assert_allclose(got, shape(at), atol=1e-5)
