@@ -13,6 +13,7 @@ import tyndall.sdf
 from tyndall.frame import Renderer
 from tyndall.gpu.device import Gpu, GpuError
 from tyndall.gpu.params import fields_of
+from tyndall.lab.baseline import Baseline
 from tyndall.lab.busy import Busy
 from tyndall.lab.truth import TruthSettings, trace
 from tyndall.scene.model import (
@@ -113,6 +114,9 @@ def test_every_entry_point_compiles_and_is_used(gpu: Gpu, monkeypatch: pytest.Mo
         cast(gpu, world, [[0, 0, 0]], [[0, 0, -1]])
         blocked(gpu, world, [[0, 0, 0]], [[0, 0, -1]])
     evaluate(gpu, Snippet(SnippetSource("plane", "fn plane(p: vec3f) -> f32 { return p.y; }")), np.zeros((1, 3)))
+    for stage in ("fragment", "compute"):
+        with Baseline(gpu, Scene(implicits=(Implicit(sphere()),)), (8, 6), stage=stage):  # type: ignore[arg-type]
+            pass
     monkeypatch.setattr("tyndall.lab.busy._ROUNDS", 2)
     monkeypatch.setitem(gpu.adapter_info, "adapter_type", "DiscreteGPU")
     with Busy(gpu) as busy:
