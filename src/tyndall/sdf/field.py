@@ -33,6 +33,7 @@ from tyndall.scene.model import Implicit
 from tyndall.sdf.marching import Marching
 from tyndall.sdf.program import Kinds, Program, compile_shape
 from tyndall.sdf.shape import Box, Floats
+from tyndall.sdf.snippets import validate
 
 OWNER = "implicit"
 _OBJECT = "package::sdf::objects::ImplicitObject"
@@ -89,6 +90,7 @@ class Field(Closing):
     Raises:
         ParameterError: a shape that has no program.
         GpuError: more than the device holds.
+        SnippetError: a user's code that does not compile.
     """
 
     def __init__(
@@ -137,6 +139,8 @@ class Field(Closing):
             words, slots = words + program.size, slots + len(program.slots)
             materials += 1 + len(program.materials)
             cells, entries = cells + made.cells, entries + made.capacity
+        for source in self._kinds.sources():
+            validate(gpu, source)
         for made in self._objects:
             made.first_entry += words
         self._words = np.concatenate([np.zeros((0, 2), np.uint32), *(self._placed_words(o) for o in self._objects)])
@@ -206,7 +210,7 @@ class Field(Closing):
         text = "\n".join([*(f"const {name} = {n}u;" for name, n in constants.items()), self._kinds.wesl()])
         assert self._params is not None
         return {
-            "implicit_objects": self._object_buffer.read().telling(text),
+            "implicit_objects": self._object_buffer.read().telling(text, untrusted=not self.is_trusted),
             "implicit_slots": self._slot_buffer.read(),
             "implicit_lists": self._list_buffer.read(),
             "implicit_cells": self._cell_buffer.read(),
@@ -241,6 +245,16 @@ class Field(Closing):
             row["counts"] = np.clip(blocks, 1, 4) * (finest // 4)
             row["first_cell"] = made.first_cell + (_COARSE**3 if made.levels > 1 else 0)
         self._write(self._object_buffer, self._rows[index : index + 1], index * self._rows.itemsize)
+
+    def place(self, index: int, transform: Any) -> None:
+        """An object stands elsewhere: one write, and nothing is pruned again."""
+        made = self._objects[index]
+        made.implicit = dataclasses.replace(made.implicit, transform=transform)
+        self._describe(index)
+
+    def move(self, name: str, matrices: Any) -> None:
+        """Parts of a name are moved."""
+        raise NotImplementedError
 
     def _jobs(self, index: int) -> list[Any]:
         """The divisions of an object, the coarse one first, each in as many parts as the marks take."""

@@ -26,6 +26,7 @@ from tyndall.sdf.solids import (
     cap,
     ellipsoid_distance,
     length,
+    not_thin,
     rhombus_distance,
     sector,
     triangle_distance,
@@ -82,6 +83,10 @@ class Ellipse(Profile):
 
     code: ClassVar[str] = "ellipse"
     radii: Vec2 = param((1.0, 0.5), SMALLEST, None, "half axes", unit="m")
+
+    def __post_init__(self) -> None:
+        Primitive.__post_init__(self)
+        not_thin(self.radii)
 
     def distance(self, p: Floats) -> Floats:
         return ellipsoid_distance(p * [1, 1, 0], np.array([*self.radii, _FAR]))

@@ -20,10 +20,10 @@ from tyndall.gpu.params import ParameterError, fields_of
 from tyndall.scene.model import Implicit, Material
 from tyndall.sdf import X, Y, Z
 from tyndall.sdf.modifiers import Bend, Displace, Elongate, Extrude, Mirror, Noise, Revolve, Round, Shell, Twist
-from tyndall.sdf.profiles import PROFILES, Ellipse
+from tyndall.sdf.profiles import PROFILES
 from tyndall.sdf.repetition import Cell, MirroredForever, Polar, Repeated, RepeatedForever, Repetition
 from tyndall.sdf.shape import Combination, Floats, Modifier, Named, Painted, Primitive, Shape, Transformed
-from tyndall.sdf.solids import SOLIDS, Ellipsoid
+from tyndall.sdf.solids import SOLIDS
 
 MODIFIERS = (
     Bend, Cell, Displace, Elongate, Extrude, Mirror, MirroredForever, Noise, Revolve, Round, Shell, Twist,
@@ -48,6 +48,7 @@ CASES: dict[str, Shape] = {
     "round cone, across": sdf.round_cone((0.5, 0.2, -0.4), (-0.5, 0.1, 0.5), 0.1, 0.6),
     "ellipsoid, needle": sdf.ellipsoid((0.1, 1.2, 0.1)),
     "ellipsoid, disc": sdf.ellipsoid((1.1, 0.15, 0.8)),
+    "ellipsoid, sheet": sdf.ellipsoid((1.2, 0.03, 1.0)),
     "ellipse, needle": sdf.ellipse((0.1, 1.2)),
     "rounded box, flat": sdf.rounded_box((1.2, 0.8, 0.3), 0.15),
     "frame, flat": sdf.box_frame((1.2, 0.8, 0.3), 0.06),
@@ -144,13 +145,16 @@ CASES: dict[str, Shape] = {
     "named": sdf.link(0.3, 0.4, 0.1).named("part"),
 }
 for _operation in (sdf.union, sdf.intersection, sdf.subtraction):
-    _three = sdf.sphere(0.7), sdf.box(0.9).at(0.4, 0.1), sdf.torus(0.6, 0.2).at(0, 0.5)
+    _apart = 0.7 if _operation is sdf.subtraction else 0.1
+    _three = sdf.sphere(0.8), sdf.box(1.1).at(_apart, 0.1), sdf.torus(0.6, 0.4).at(0, 2 * _apart)
     CASES[f"{_operation.__name__}, hard"] = _operation(*_three)
     for _blend in ("polynomial", "exponential", "root"):
         CASES[f"{_operation.__name__}, {_blend}"] = _operation(*_three, smooth=0.2, blend=_blend)
 EXACT = [name for name, shape in CASES.items() if shape.accuracy != "bound"]
 # What a random pair of places is not likely to find: where a bound is reached only far away, or in one place.
-LOOSE = {"noisy", "noisy, finely", "twisted, off", "bent, off", "repeated forever, twisted", "displaced"}
+LOOSE = {
+    "noisy", "noisy, finely", "twisted", "twisted, off", "bent", "bent, off", "repeated forever, twisted", "displaced",
+}  # fmt: skip
 
 
 def places(shape: Shape, count: int, seed: int = 0, margin: float = 0.6) -> Floats:
@@ -258,9 +262,14 @@ def of_formulas(shape: Shape) -> bool:
     return not any(issubclass(cls, (Combination, Painted, Named)) for cls in classes(shape))
 
 
-def test_the_device_has_the_same_values(gpu: Gpu) -> None:
-    """All formulas in one kernel, each at its own places, far ones too."""
-    names = [name for name, shape in CASES.items() if of_formulas(shape)]
+FORMULAS = [name for name, shape in CASES.items() if of_formulas(shape)]
+BATCH = 42  # Mesa's software adapter keeps 80 masks of nested branches, and makes a switch a nest of them
+
+
+@pytest.mark.parametrize("first", range(0, len(FORMULAS), BATCH))
+def test_the_device_has_the_same_values(gpu: Gpu, first: int) -> None:
+    """Many formulas in one kernel, each at its own places, far ones too."""
+    names = FORMULAS[first : first + BATCH]
     writer, cases = Writer(), []
     for i, name in enumerate(names):
         writer.lines = []
@@ -269,18 +278,18 @@ def test_the_device_has_the_same_values(gpu: Gpu) -> None:
     text = "\n".join(
         [
             *sorted(writer.imports),
-            f"fn value(which: u32, p: vec3f) -> f32 {{ switch which {{ {' '.join(cases)} default: {{ return 0.0; }} }} }}",
+            f"fn value(which: u32, p: vec3f) -> f32 {{ switch which {{ {' '.join(cases)}",
+            "default: { return 0.0; } } }",
             "fn evaluate(x: vec4f) -> vec4f { return vec4f(value(u32(x.w), x.xyz)); }",
         ]
     )
     near, far = (np.stack([places(CASES[n], 60, 3, margin) for n in names]) for margin in (0.3, 8.0))
     at = np.concatenate([near, far], axis=1).astype(np.float32)
     which = np.broadcast_to(np.arange(len(names), dtype=np.float32)[:, None, None], (*at.shape[:2], 1))
-    got = props.evaluate(gpu, "test_vocabulary", text, np.concatenate([at, which], axis=2).reshape(-1, 4))
-    values = got[:, 0].reshape(at.shape[:2])
+    inputs = np.concatenate([at, which], axis=2).reshape(-1, 4)
+    values = props.evaluate(gpu, f"test_vocabulary_{first}", text, inputs)[:, 0].reshape(at.shape[:2])
     for i, name in enumerate(names):
-        wanted = CASES[name](at[i])
-        away = np.abs(values[i] - wanted)
+        away = np.abs(values[i] - CASES[name](at[i]))
         allowed = 1e-5 * CASES[name].lipschitz * (1 + np.linalg.norm(at[i], axis=1))
         assert (away <= allowed).all(), f"{name}: {(away / allowed).max():.1f} times what is allowed"
 
@@ -313,8 +322,7 @@ def test_a_distance_leads_to_the_surface(name: str) -> None:
     if shape.accuracy == "outside":
         p, d = p[d > 0], d[d > 0]
     ends = shape(p - d[:, None] * gradient(shape, p))
-    needles = any(issubclass(cls, (Ellipsoid, Ellipse)) for cls in classes(shape))
-    off = np.abs(ends) > (1e-3 if needles else 1e-5) * (1 + np.abs(d))
+    off = np.abs(ends) > 2e-5 * (1 + np.abs(d))
     assert off.mean() <= 0.002, f"{off.sum()} of {len(d)} ends are off, by {np.abs(ends).max():g} at most"
 
 
@@ -515,6 +523,7 @@ MISTAKES = {
     "sphere().orient((0, 0, 0))": "axis: (0, 0, 0) is no direction",
     "sphere().scale(0)": "matrix: not finite numbers that have an inverse",
     "round_cone(radius_a=3)": "round_cone: one ball holds the other; use a sphere",
+    "ellipsoid((1, 1, 0.001))": "radii: one is less than a hundredth of another; scale a sphere",
     "rounded_box(1, 0.6)": "radius: 0.6 is more than half the shortest side",
     "death_star(1, 1, 3)": "death_star: the two balls' surfaces do not meet",
     "polygon((0, 0), (1, 1))": "polygon: 2 corners; unite polygons of 3 or 4",
