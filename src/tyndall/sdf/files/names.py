@@ -79,8 +79,8 @@ def type_names() -> dict[type[Shape], str]:
 
 
 def is_data(f: Field) -> bool:
-    """Whether a declared parameter is floating-point numbers, which S5 gives as ``data``."""
-    return f.type is float or (get_origin(f.type) is tuple and set(get_args(f.type)) == {float})
+    """Whether a declared parameter of a primitive is numbers, which S5 gives as ``data``."""
+    return f.type in (float, int) or (get_origin(f.type) is tuple and set(get_args(f.type)) <= {float, int})
 
 
 def width(f: Field) -> int:
