@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from pathlib import Path
 from typing import Any, get_args, get_origin
 
@@ -257,6 +258,8 @@ def test_the_rest_of_eight_numbers_is_ignored(folder: Path) -> None:
     assert model(folder, {"type": "Primitives/Sphere", "data": [0.5, 1, 2, 3, 4, 5, 6, 7]}) == sdf.sphere(0.5)
     assert model(folder, {"type": "Primitives/Sphere", "radius": 0.5}) == sdf.sphere(0.5)
     assert model(folder, {"type": "Primitives/Sphere"}) == sdf.sphere()
+    star = model(folder, {"type": "Operations/Extrude", "children": [{"type": "Primitives/Star", "data": [7, 1, 0.5]}]})
+    assert star.children[0] == sdf.star(7, 1, 0.5)
 
 
 # --- round trips --------------------------------------------------------------------------------------------------
@@ -565,7 +568,7 @@ def test_whatever_a_file_holds_it_is_told_in_lines(folder: Path) -> None:
         return [mutate(v) for v in value] if isinstance(value, list) else value
 
     loaded, told = 0, []
-    for i in range(400):
+    for i in range(150):
         path = write(folder, mutate(parse(sources[i % len(sources)])))
         try:
             load(path)
@@ -573,4 +576,41 @@ def test_whatever_a_file_holds_it_is_told_in_lines(folder: Path) -> None:
         except SceneError as error:
             told += error.mistakes
     assert all(mistake and "\n" not in mistake for mistake in told)
-    assert 20 < loaded < 380
+    assert 10 < loaded < 140
+
+
+# --- the docs -----------------------------------------------------------------------------------------------------
+
+DOCS = Path(__file__).parents[4] / "docs" / "sdf-json.md"
+
+
+def docs() -> str:
+    if not DOCS.exists():
+        pytest.skip("an installed package has no docs folder")
+    return DOCS.read_text()
+
+
+def row(name: str, cls: type[Shape]) -> str:
+    """The line of a type in the docs' table."""
+    if hasattr(cls, "from_data"):
+        return f"| `{name}` | as it was saved |"
+    parts = []
+    for f in fields_of(cls):
+        args = get_args(f.type)
+        is_vector = get_origin(f.type) is tuple
+        parts.append(f"`{f.name}`" + (f" × {len(args)}" if is_vector else f" ({', '.join(args)})" if args else ""))
+    return f"| `{name}` | {', '.join(parts) or 'none'} |"
+
+
+def test_the_docs_have_every_type() -> None:
+    lines = docs().splitlines()
+    rows = [row(name, cls) for name, cls in node_classes().items()]
+    missing = [text for text in rows if text not in lines]
+    assert not missing, "docs/sdf-json.md lacks:\n" + "\n".join(missing)
+
+
+def test_the_examples_of_the_docs_are_right(tmp_path: Path) -> None:
+    blocks = re.findall(r"```json\n(.*?)```", docs(), re.DOTALL)
+    paths = [write(tmp_path, block, f"{i}.json") for i, block in enumerate(blocks)]
+    made = [load(path) for path in paths]
+    assert [type(thing) for thing in made] == [SnippetKind, FragmentShader, ShadedMaterial, Painted, Scene]
