@@ -10,6 +10,8 @@ array([0.5 , 1.25])
 
 from tyndall.sdf.files import load as load
 from tyndall.sdf.files import save as save
+from tyndall.sdf.grid import Grid as Grid
+from tyndall.sdf.grid import from_mesh as from_mesh
 from tyndall.sdf.profiles import PROFILES as PROFILES
 from tyndall.sdf.profiles import arc as arc
 from tyndall.sdf.profiles import bar as bar

@@ -13,7 +13,7 @@ from types import UnionType
 from typing import Any, Literal, Union, get_args, get_origin
 
 from tyndall.gpu.params import Field
-from tyndall.sdf import modifiers, profiles, repetition, solids
+from tyndall.sdf import grid, modifiers, profiles, repetition, solids
 from tyndall.sdf.shape import Combination, Modifier, Named, Operation, Painted, Primitive, Shape, Transformed
 from tyndall.sdf.snippets import Snippet
 
@@ -26,7 +26,7 @@ OPERATIONS: dict[str, Operation] = {
     "SmoothSubtraction": "subtraction",
 }
 GROUP = "Operations/Group"
-_DECLARED = (modifiers, profiles, repetition, solids)  # where nodes are declared, and loaded with this module
+_DECLARED = (grid, modifiers, profiles, repetition, solids)  # where nodes are declared, and loaded with this module
 _SPECIAL = (Combination, Transformed, Painted, Named, Snippet)
 
 
