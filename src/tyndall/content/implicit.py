@@ -29,6 +29,7 @@ from tyndall.gpu.device import Gpu, Raster
 from tyndall.gpu.resources import Bound, Buffer, Resource, Texture
 from tyndall.scene.model import Implicit, Material, Scene
 from tyndall.sdf.field import Field
+from tyndall.sdf.shading import shines
 from tyndall.sdf.shape import Named, Painted, Shape
 
 MODULE = "package::content::implicit"
@@ -54,7 +55,7 @@ class Fields:
         self._images: dict[str, Texture] = {}
         self._maps: dict[int, Texture] = {}
         self._shade: Texture | None = None
-        self.emits = any(any(material.emissive) for one in scene.implicits for material in materials_of(one))
+        self.emits = any(shines(material) for one in scene.implicits for material in materials_of(one))
         self.parts = {node.name for one in scene.implicits for node in nodes_of(one.shape) if isinstance(node, Named)}
         self.field = Field(gpu, scene.implicits)
         try:

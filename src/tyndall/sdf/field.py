@@ -30,9 +30,10 @@ from numpy.typing import ArrayLike, NDArray
 from tyndall.gpu.device import ComputePass, Gpu
 from tyndall.gpu.params import ParameterError, nearest
 from tyndall.gpu.resources import Buffer, Closing, ParamsBuffer, Resource
-from tyndall.scene.model import Implicit
+from tyndall.scene.model import Implicit, Material
 from tyndall.sdf.marching import Marching
 from tyndall.sdf.program import TURNED, Kinds, Leaf, Part, Program, compile_shape
+from tyndall.sdf.shading import Shadings
 from tyndall.sdf.shape import Box, Floats
 from tyndall.sdf.snippets import validate
 
@@ -172,7 +173,7 @@ class Field(Closing):
     ) -> None:
         self._gpu, self._owner, self._pruning = gpu, owner, pruning
         self._marching = marching or Marching()
-        self._kinds = Kinds()
+        self._kinds, self._shadings = Kinds(), Shadings()
         self._buffers: list[Buffer] = []
         self._params: ParamsBuffer | None = None
         self._objects: list[_Object] = []
@@ -207,12 +208,20 @@ class Field(Closing):
             words, slots = words + program.size, slots + len(program.slots)
             materials += 1 + len(program.materials)
             cells, entries = cells + made.cells, entries + made.capacity
+        listed = [m for o in self._objects for m in (o.implicit.material, *o.program.materials)]
+        shaded = [self._shadings.of(m) for m in listed]
         for source in self._kinds.sources():
             validate(gpu, source)
+        self._shadings.validate(gpu)
         for made in self._objects:
             made.first_entry += words
         self._words = np.concatenate([np.zeros((0, 2), np.uint32), *(self._placed_words(o) for o in self._objects)])
-        self._slots = np.concatenate([np.zeros((1, 4), np.float32), *(self._placed_slots(o) for o in self._objects)])
+        numbers = self._shadings.numbers  # in rows after all slots
+        rows = np.zeros((-(-len(numbers) // 4), 4), np.float32)
+        rows.reshape(-1)[: len(numbers)] = numbers
+        first_number = 4 * (1 + slots)
+        placed = [self._placed_slots(o) for o in self._objects]
+        self._slots = np.concatenate([np.zeros((1, 4), np.float32), *placed, rows])
         self._rows = np.zeros(max(1, len(self._objects)), gpu.dtype(_OBJECT))
         self._object_buffer = self._buffer("objects", self._rows, _OBJECT)
         self._slot_buffer = self._buffer("slots", self._slots, "vec4f")
@@ -233,7 +242,7 @@ class Field(Closing):
         self._span_buffer = self._buffer("spans", spans, "vec2u")
         most_jobs = sum(o.levels + o.program.size // _PART_SIZE for o in self._objects)
         self._job_buffer = self._buffer("jobs", self._gpu.dtype(_JOB).itemsize * max(1, most_jobs), _JOB)
-        self._material_buffer = self._buffer("materials", self._materials(), _MATERIAL)
+        self._material_buffer = self._buffer("materials", self._materials(listed, shaded, first_number), _MATERIAL)
         self._params = gpu.params(f"{self._owner}.marching", self._marching, owner=self._owner)
         self._write(self._list_buffer, self._words)
         for index in range(len(self._objects)):
@@ -260,12 +269,14 @@ class Field(Closing):
         slots[rows[named], 2] += made.first_material + 1
         return slots
 
-    def _materials(self) -> NDArray[Any]:
-        listed = [m for o in self._objects for m in (o.implicit.material, *o.program.materials)]
+    def _materials(
+        self, listed: Sequence[Material], shaded: Sequence[tuple[int, int]], first_number: int
+    ) -> NDArray[Any]:
         rows = np.zeros(max(1, len(listed)), self._gpu.dtype(_MATERIAL))
-        for row, m in zip(rows, listed, strict=False):
+        for row, m, (shader, at) in zip(rows, listed, shaded, strict=False):
             row["base_color"], row["emissive"] = m.base_color[:3], m.emissive
             row["metallic"], row["roughness"] = m.metallic, m.roughness
+            row["shader"], row["numbers"], row["lit"] = shader + 1, first_number + at, getattr(m, "lit", True)
         return rows
 
     def _bind(self) -> dict[str, Any]:
@@ -275,7 +286,16 @@ class Field(Closing):
             "IMPLICIT_VALUES": max([1, *(p.values for p in programs)]),
             "IMPLICIT_PLACES": max([1, *(p.places for p in programs)]),
         }
-        text = "\n".join([*(f"const {name} = {n}u;" for name, n in constants.items()), self._kinds.wesl()])
+        shaded = str(not self._shadings.is_trusted).lower()
+        text = "\n".join(
+            [
+                *(f"const {name} = {n}u;" for name, n in constants.items()),
+                f"const IMPLICIT_SHADED = {shaded};",
+                "fn implicit_number(i: u32) -> f32 { return implicit_slots[i >> 2u][i & 3u]; }",
+                self._kinds.wesl(),
+                self._shadings.wesl(),
+            ]
+        )
         assert self._params is not None
         return {
             "implicit_objects": self._object_buffer.read().telling(text, untrusted=not self.is_trusted),
@@ -542,7 +562,7 @@ class Field(Closing):
     @property
     def is_trusted(self) -> bool:
         """Whether no user's code is in it."""
-        return self._kinds.is_trusted
+        return self._kinds.is_trusted and self._shadings.is_trusted
 
     @property
     def size(self) -> int:

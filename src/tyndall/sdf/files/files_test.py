@@ -19,6 +19,7 @@ from tyndall.scene.model import DirectionalLight, Implicit, Material, Scene
 from tyndall.sdf.files import load, save
 from tyndall.sdf.files.names import GROUP, OPERATIONS, node_classes
 from tyndall.sdf.files.places import parse, places
+from tyndall.sdf.grid import Grid
 from tyndall.sdf.shading import FragmentShader, ShadedMaterial, described
 from tyndall.sdf.shape import Combination, Floats, Named, Painted, Primitive, Shape, Transformed, rotation
 from tyndall.sdf.snippets import Snippet, SnippetKind, SnippetSource
@@ -315,6 +316,15 @@ def test_every_kind_of_node_comes_back(tmp_path: Path, name: str) -> None:
     assert made, f"{name}: nothing could be made"
     for shape in made:
         round_trip(tmp_path, shape)
+
+
+def test_samples_of_a_mesh_come_back(tmp_path: Path) -> None:
+    x = np.linspace(-1, 1, 5, dtype=np.float32)
+    samples = np.linalg.norm(np.stack(np.meshgrid(x, x, x), axis=-1), axis=-1) - 0.7
+    round_trip(tmp_path, Grid(samples, (-1, -1, -1), 0.5).at(1))
+    wrong = (tmp_path / "shape.json").read_text().replace('"counts": [5', '"counts": [6')
+    (tmp_path / "shape.json").write_text(wrong)
+    assert mistakes(tmp_path / "shape.json")[0].startswith("model: ")
 
 
 RED = Material("red", (1, 0, 0.1, 1), metallic=1.0, roughness=0.1 + 0.2, emissive=(0.0, 1e-30, 1 / 3))
