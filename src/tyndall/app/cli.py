@@ -113,10 +113,19 @@ def render(
     frames: Annotated[int, typer.Option(metavar="N", min=1, help="Frames to draw; the last is kept.")] = 16,
     adapter: AdapterName = None,
     seed: Seed = 0,
+    time: Annotated[
+        float | None, typer.Option(metavar="S", help="Seconds into the motion of a scene that has one.")
+    ] = None,
+    view: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME", help="Not the picture but steps, normals, depth, ids, albedo, roughness or slice."
+        ),
+    ] = None,
     out: Out = None,
     as_json: Json = False,
 ) -> None:
-    """Draw one picture: a PNG, and an EXR with linear light and depth."""
+    """Draw one picture: a PNG, and an EXR with linear light and depth; or a PNG of what it is made of."""
     pixels = arguments.parse_size(size)
     names = arguments.split_list([technique])
     if len(names) != 1:
@@ -127,34 +136,44 @@ def render(
     parameters = _parameters(context.obj.flags, "volumetric", [technique], families, model)
     with console.Work("loading") as work:
         described = open_scene(scene, lights)
+        if time is not None:
+            if described.motion is None:
+                raise ParameterError(f"--time: nothing moves in {scene}")
+            described = described.at_time(time)
         folder = out or Path("out", Path(scene.replace(":", "-")).stem)  # not the name in a file, which may be a path
         from tyndall.lab.picture import check_folder
         from tyndall.lab.render import render as draw
+        from tyndall.lab.views import render_view
 
         check_folder(folder)
         work.advance(0.3, "drawing")
-        picture = draw(
-            described, size=pixels, parameters=parameters, frames=frames, adapter=adapter, seed=seed, **families
-        )
+        if view is not None:
+            picture = render_view(described, view, pixels, adapter=adapter)
+        else:
+            picture = draw(
+                described, size=pixels, parameters=parameters, frames=frames, adapter=adapter, seed=seed, **families
+            )
         work.advance(0.9, "saving")
         folder.mkdir(parents=True, exist_ok=True)
-        files = [picture.save(folder / f"{technique}{suffix}") for suffix in (".png", ".exr")]
+        suffixes = (".png",) if view else (".png", ".exr")
+        files = [picture.save(folder / f"{view or technique}{suffix}") for suffix in suffixes]
     if as_json:
         document = {
             "adapter": picture.metadata["adapter"],
             "scene": described.name,
             "triangles": described.triangle_count,
+            "implicits": len(described.implicits),
             "size": list(picture.size),
-            "technique": technique,
-            "image": str(files[0]),
-            "exr": str(files[1]),
+            **({"view": view} if view else {"technique": technique}),
+            **{key: str(file) for key, file in zip(("image", "exr"), files, strict=False)},
         }
         print(json.dumps(document, indent=2))
     else:
         width, height = picture.size
         name = "".join(c if c.isprintable() else "\ufffd" for c in described.name)  # a file's, for a terminal
-        print(f"{files[0]}  ({name}, {technique}, {width}×{height}, {picture.metadata['adapter']})")
-        print(files[1])
+        print(f"{files[0]}  ({name}, {view or technique}, {width}×{height}, {picture.metadata['adapter']})")
+        for file in files[1:]:
+            print(file)
 
 
 @app.command()
@@ -344,6 +363,29 @@ def shadows(
         result = figures.shadows(adapter, out, quick=quick, fresh=fresh, progress=work.advance)
         for line in result.notes:
             work.note(line)
+    if as_json:
+        print(json.dumps(result.to_json(), indent=2))
+    else:
+        print(result.markdown())
+
+
+@bench.command()
+def sdf(
+    *,
+    quick: Annotated[bool, typer.Option("--quick", help="The same in small, for a software adapter.")] = False,
+    seconds: Annotated[
+        float | None,
+        typer.Option(metavar="S", min=0.01, help="How long each of our frames is measured; 30, or 1 with --quick."),
+    ] = None,
+    adapter: AdapterName = None,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the figures and the tables.")] = Path("out/sdf"),
+    as_json: Json = False,
+) -> None:
+    """Implicit surfaces against a plain shader loop: time, edits, first picture, and whether pruning is right."""
+    from tyndall.lab import bench_sdf as figures
+
+    with console.Work("reading", remaining=True) as work:
+        result = figures.sdf(adapter, out, quick=quick, seconds=seconds, progress=work.advance)
     if as_json:
         print(json.dumps(result.to_json(), indent=2))
     else:

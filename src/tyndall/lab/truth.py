@@ -392,7 +392,9 @@ class _CutOff(GpuError):
     """The adapter ended an invocation's loops before they were done."""
 
     def __init__(self) -> None:
-        super().__init__("truth: rays march for longer through these implicit surfaces than a software adapter lets them")
+        super().__init__(
+            "truth: rays march for longer through these implicit surfaces than a software adapter lets them"
+        )
 
 
 class _Tracer(Closing):

@@ -24,7 +24,18 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from tyndall.scene.model import Camera, HenyeyGreenstein, Instance, Material, Medium, Mesh, Scene, SpotLight, Vec3
+from tyndall.scene.model import (
+    Camera,
+    HenyeyGreenstein,
+    Instance,
+    Material,
+    Medium,
+    Mesh,
+    Scene,
+    SpotLight,
+    Vec3,
+    box_corners,
+)
 
 FILL = 0.6  # of the picture's height
 WIDEST = 0.85  # of the picture's width
@@ -79,13 +90,15 @@ def _vec3(v: Points) -> Vec3:
 
 
 def _points(scene: Scene) -> Points:
-    """(N, 3) points of the surface in the world, at most about ``_MOST_POINTS``, spread over all instances."""
-    if not scene.instances:
-        low, high = scene.bounds
-        return np.array([low, high])
+    """(N, 3) points of the surface in the world: at most about ``_MOST_POINTS``, spread over all instances, and the
+    corners of the boxes of implicit surfaces.
+    """
+    parts = [box_corners(*implicit.bounds) for implicit in scene.implicits if implicit.bounds is not None]
+    if not scene.instances and not parts:
+        return box_corners(*scene.bounds)
     total = sum(len(i.mesh.positions) for i in scene.instances)
     step = -(-total // _MOST_POINTS)
-    parts, skipped = [], 0
+    skipped = 0
     for instance in scene.instances:
         chosen = instance.mesh.positions[skipped::step].astype(np.float64)
         skipped = (skipped - len(instance.mesh.positions)) % step
