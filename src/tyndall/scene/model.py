@@ -287,6 +287,12 @@ class Material(_Checked):
     alpha_mode: Literal["opaque", "mask"] = param("opaque", doc="mask: texels below the cutoff are holes")
     alpha_cutoff: float = param(0.5, 0, 1, "alpha below this is a hole")
     double_sided: bool = param(False, doc="lit from both sides; no back-face culling")
+    reflections: bool = param(False, doc="shows what is around as a polished surface does; of implicit surfaces")
+    transmission: float = param(0.0, 0, 1, "part of what a dielectric does not reflect that passes; implicit surfaces")
+    ior: float = param(1.5, 1, 4, "index of refraction, against that of the air")
+    attenuation_distance: float = param(
+        1.0, 1e-6, None, "way inside after which the base colour is left of white light", unit="m"
+    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,6 +17,7 @@ from tyndall.gpu.device import ComputePass, Gpu
 from tyndall.gpu.params import check
 from tyndall.gpu.resources import Bound, Buffer, ParamsBuffer, Resource, Texture
 from tyndall.scene.model import Camera, Scene
+from tyndall.sdf.field import Field
 from tyndall.tracing.world import World
 
 
@@ -74,6 +75,7 @@ class View:
         size: width and height of the picture in pixels.
         frame: frames drawn before this one.
         make_world: gives :attr:`world`.
+        fields: the scene's implicit surfaces on the device; None where it has none.
         owner: "family.name": owner in the ledger and prefix of its passes.
         maps_wanted: whether the volumetric technique reads shadow maps; what a shadow technique need not draw
             otherwise.
@@ -92,6 +94,7 @@ class View:
     maps_wanted: bool = False
     air_wanted: bool = True
     make_world: Callable[[], World] | None = None
+    fields: Field | None = None
     _camera: Camera | None = None
     _resources: dict[str, Resource] = field(default_factory=dict)
     _descriptions: dict[str, Any] = field(default_factory=dict)
@@ -191,6 +194,7 @@ class View:
             self._parts[label] = made
         made.images, made.scope, made.overlay, made.frame = self.images, self.scope, self.overlay, self.frame
         made.camera, made.maps_wanted, made.air_wanted = self.camera, self.maps_wanted, self.air_wanted
+        made.fields = self.fields
         return made
 
     def forget(self) -> None:
