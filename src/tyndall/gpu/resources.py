@@ -95,8 +95,11 @@ class Bound:
 
     def declaring(self, **constants: bool) -> Bound:
         """The same, with constants that shaders may import beside it: branches on them cost nothing."""
-        lines = [f"const {name} = {str(value).lower()};" for name, value in constants.items()]
-        preamble = "\n".join([*filter(None, [self.slot.preamble]), *lines])
+        return self.telling("\n".join(f"const {name} = {str(value).lower()};" for name, value in constants.items()))
+
+    def telling(self, text: str) -> Bound:
+        """The same, with WESL declarations (and imports, a line each) that shaders may import beside it."""
+        preamble = "\n".join(filter(None, [self.slot.preamble, text]))
         return Bound(replace(self.slot, preamble=preamble), self.native)
 
 

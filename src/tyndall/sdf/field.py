@@ -1,0 +1,316 @@
+"""Implicit surfaces on the device: their programs, and the cells that say which part of one matters where.
+
+Theory. A sphere tracer asks for the distance some twenty times a ray, and a scene of n parts answers each time with all
+of them, though most are far from the ray. Lipschitz pruning (Barbier, Sanchez, Paris, Michel, Lambert, Boubekeur,
+Paulin, Thonat: *Lipschitz Pruning: Hierarchical Simplification of Primitive-Based SDFs*, 2025) divides an object's box
+into cells, 4³, then each of them into 4³, and again: 64³. A cell walks its parent's program at its centre and leaves
+out what cannot matter anywhere inside: of two joined values the one that is beyond the other by more than both can
+change. What stays is a handful of instructions, and its value in the cell is that of the whole, bit for bit up to
+rounding. Cells in which no surface can be hold no program, only the value at their centre.
+
+Practice. Each object (:class:`~tyndall.scene.model.Implicit`) has cells in its own space. So placing an object
+elsewhere is one buffer write, and nothing is pruned again; moving a part of it prunes that object alone. Programs of
+four instructions or fewer need no cells, and what has no end has none: all of its program is run. Lists that do not fit
+are the parent's: slower, never wrong.
+
+What shaders need is in :attr:`Field.bindings`: five buffers, and in the bindings module itself a switch over the kinds
+of primitives that are in use.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tyndall.gpu.device import Gpu
+from tyndall.gpu.resources import Buffer, Closing, ParamsBuffer, Resource
+from tyndall.scene.model import Implicit
+from tyndall.sdf.marching import Marching
+from tyndall.sdf.program import Kinds, Program, compile_shape
+from tyndall.sdf.shape import Box, Floats
+
+OWNER = "implicit"
+_OBJECT = "package::sdf::objects::ImplicitObject"
+_JOB = "package::sdf::prune::Job"
+_MATERIAL = "package::sdf::march::FieldMaterial"
+_PRUNE = "package::sdf::prune"
+_MARGIN = 0.02  # of its longest side, around an object's box
+_DIVIDED = 4  # a program of more instructions has cells
+_COUNTERS = 8  # of an object: entries used, overflows, words of marks used at each level
+_LEAST_ENTRIES, _MOST_ENTRIES = 1 << 12, 1 << 22
+_FEW_MARKS = 128  # instructions whose marks need no memory; as in prune.wesl
+_MOST_MARKS = 1 << 23  # words
+
+
+@dataclass(eq=False)
+class _Object:
+    """An object on the device."""
+
+    implicit: Implicit
+    program: Program
+    first_word: int
+    first_slot: int
+    first_material: int
+    levels: int
+    first_cell: int
+    first_entry: int
+    capacity: int
+    box: Box
+    dirty: bool = True
+    moves: dict[str, Floats] = dataclasses.field(default_factory=dict)
+
+    @property
+    def cells(self) -> int:
+        return sum(64**level for level in range(1, self.levels + 1))
+
+
+class Field(Closing):
+    """The implicit surfaces of a scene on the device.
+
+    Args:
+        implicits: the objects.
+        marching: when a ray ends.
+        pruning: False runs whole programs everywhere: slower, the same picture.
+
+    Attributes:
+        bindings: what shaders that ask the field must have in their scope.
+        uploaded: bytes written since :meth:`update` was called last.
+
+    Raises:
+        ParameterError: a shape that has no program.
+        GpuError: more than the device holds.
+    """
+
+    def __init__(
+        self,
+        gpu: Gpu,
+        implicits: Sequence[Implicit],
+        *,
+        marching: Marching | None = None,
+        pruning: bool = True,
+        owner: str = OWNER,
+    ) -> None:
+        self._gpu, self._owner, self._pruning = gpu, owner, pruning
+        self._marching = marching or Marching()
+        self._kinds = Kinds()
+        self._buffers: list[Buffer] = []
+        self._params: ParamsBuffer | None = None
+        self._objects: list[_Object] = []
+        self.uploaded = 0
+        try:
+            self._upload(implicits)
+        except BaseException:
+            self.close()
+            raise
+
+    def _buffer(self, label: str, data: NDArray[Any] | int, element: str) -> Buffer:
+        buffer = self._gpu.buffer(f"{self._owner}.{label}", data, owner=self._owner, element=element)
+        self._buffers.append(buffer)
+        return buffer
+
+    def _write(self, buffer: Buffer, data: NDArray[Any], offset: int = 0) -> None:
+        self._gpu.write(buffer, data, offset)
+        self.uploaded += data.nbytes
+
+    def _upload(self, implicits: Sequence[Implicit]) -> None:
+        gpu = self._gpu
+        words = slots = materials = cells = entries = 0
+        for implicit in implicits:
+            shape: Any = implicit.shape
+            program = compile_shape(shape, self._kinds)
+            levels = self._levels(program, shape.box)
+            capacity = int(np.clip(4096 * program.size, _LEAST_ENTRIES, _MOST_ENTRIES))
+            made = _Object(
+                implicit, program, words, slots, materials, levels, cells, entries, capacity if levels else 0, shape.box
+            )
+            self._objects.append(made)
+            words, slots = words + program.size, slots + len(program.slots)
+            materials += 1 + len(program.materials)
+            cells, entries = cells + made.cells, entries + made.capacity
+        for made in self._objects:
+            made.first_entry += words
+        self._words = np.concatenate([np.zeros((0, 2), np.uint32), *(self._placed_words(o) for o in self._objects)])
+        self._slots = np.concatenate([np.zeros((1, 4), np.float32), *(self._placed_slots(o) for o in self._objects)])
+        self._rows = np.zeros(max(1, len(self._objects)), gpu.dtype(_OBJECT))
+        self._object_buffer = self._buffer("objects", self._rows, _OBJECT)
+        self._slot_buffer = self._buffer("slots", self._slots, "vec4f")
+        self._list_buffer = self._buffer("lists", 8 * max(1, words + entries), "vec2u")
+        self._cell_buffer = self._buffer("cells", 16 * max(1, cells), "vec4u")
+        self._counter_buffer = self._buffer("counters", 4 * _COUNTERS * max(1, len(self._objects)), "atomic<u32>")
+        longest = max((o.program.size for o in self._objects if o.levels), default=1)
+        marks = int(np.clip(64**3 * -(-(longest - _FEW_MARKS) // 16), 64, _MOST_MARKS))
+        self._marks_capacity = marks
+        self._mark_buffer = self._buffer("marks", 4 * marks, "u32")
+        self._job_buffer = self._buffer("jobs", self._gpu.dtype(_JOB).itemsize * max(1, 3 * len(self._objects)), _JOB)
+        self._material_buffer = self._buffer("materials", self._materials(), _MATERIAL)
+        self._params = gpu.params(f"{self._owner}.marching", self._marching, owner=self._owner)
+        self._write(self._list_buffer, self._words)
+        for index in range(len(self._objects)):
+            self._describe(index)
+        self.bindings = self._bind()
+
+    def _levels(self, program: Program, box: Box) -> int:
+        bounded = bool(np.isfinite(box[0]).all() and np.isfinite(box[1]).all())
+        if not bounded or not self._pruning or program.size <= _DIVIDED:
+            return 0
+        return 2 if program.size <= 8 else 3
+
+    def _placed_words(self, made: _Object) -> NDArray[np.uint32]:
+        words = made.program.words.copy()
+        words[:, 1] += made.first_slot + 1
+        return words
+
+    def _placed_slots(self, made: _Object) -> NDArray[np.float32]:
+        slots: NDArray[np.float32] = made.program.slots.copy()
+        for row in made.program.payload_rows:
+            slots[row, 0] += made.first_slot + 1
+        rows = made.program.material_rows
+        named = slots[rows, 2] >= 0
+        slots[rows[named], 2] += made.first_material + 1
+        return slots
+
+    def _materials(self) -> NDArray[Any]:
+        listed = [m for o in self._objects for m in (o.implicit.material, *o.program.materials)]
+        rows = np.zeros(max(1, len(listed)), self._gpu.dtype(_MATERIAL))
+        for row, m in zip(rows, listed, strict=False):
+            row["base_color"], row["emissive"] = m.base_color[:3], m.emissive
+            row["metallic"], row["roughness"] = m.metallic, m.roughness
+        return rows
+
+    def _bind(self) -> dict[str, Any]:
+        programs = [o.program for o in self._objects]
+        constants = {
+            "IMPLICIT_OBJECTS": len(programs),
+            "IMPLICIT_VALUES": max([1, *(p.values for p in programs)]),
+            "IMPLICIT_PLACES": max([1, *(p.places for p in programs)]),
+        }
+        text = "\n".join([*(f"const {name} = {n}u;" for name, n in constants.items()), self._kinds.wesl()])
+        assert self._params is not None
+        return {
+            "implicit_objects": self._object_buffer.read().telling(text),
+            "implicit_slots": self._slot_buffer.read(),
+            "implicit_lists": self._list_buffer.read(),
+            "implicit_cells": self._cell_buffer.read(),
+            "implicit_materials": self._material_buffer.read(),
+            "implicit_marching": self._params.bound,
+        }
+
+    # --- what an object is on the device ---
+
+    def _describe(self, index: int) -> None:
+        """Write an object's row."""
+        made, row = self._objects[index], self._rows[index]
+        program = made.program
+        placement = np.asarray(made.implicit.transform, np.float64)
+        row["to_local"] = np.linalg.inv(placement)[:3]
+        row["factor"] = np.linalg.svd(placement[:3, :3], compute_uv=False)[-1]
+        low, high = made.box
+        longest = float(np.max(high - low)) if np.isfinite(high - low).all() else 0.0
+        margin = _MARGIN * longest
+        row["lower"] = np.maximum(low - margin, -1e30)
+        row["upper"] = np.minimum(high + margin, 1e30)
+        row["lipschitz"] = program.lipschitz
+        row["begin"], row["count"] = made.first_word, program.size
+        row["material"] = made.first_material
+        row["cell"] = 0.0
+        if made.levels:
+            finest = 4**made.levels
+            sides = np.maximum(high - low, 1e-6 * longest) + 2 * margin
+            width = float(sides.max()) / finest
+            coarse = np.clip(np.ceil(sides / (width * finest / 4) - 1e-6).astype(int), 1, 4)
+            row["cell"] = width
+            row["counts"] = coarse * (finest // 4)
+            row["first_cell"] = made.first_cell + sum(64**level for level in range(1, made.levels))
+        self._write(self._object_buffer, self._rows[index : index + 1], index * self._rows.itemsize)
+
+    def _jobs(self, index: int) -> list[Any]:
+        """The divisions of an object, coarsest first."""
+        made, row = self._objects[index], self._rows[index]
+        jobs = []
+        for level in range(1, made.levels + 1):
+            job = np.zeros((), self._gpu.dtype(_JOB))
+            scale = 4 ** (made.levels - level)
+            job["lower"], job["width"] = row["lower"], row["cell"] * scale
+            job["counts"] = row["counts"] // scale
+            job["parent_counts"] = 1 if level == 1 else row["counts"] // (4 * scale)
+            job["first_cell"] = made.first_cell + sum(64**n for n in range(1, level))
+            job["first_parent"] = made.first_cell + sum(64**n for n in range(1, level - 1))
+            job["begin"], job["count"] = made.first_word, made.program.size
+            job["lipschitz"] = made.program.lipschitz
+            job["is_root"], job["is_last"] = level == 1, level == made.levels
+            job["first_entry"], job["capacity"] = made.first_entry, made.capacity
+            job["counters"] = _COUNTERS * index
+            job["marks_capacity"] = self._marks_capacity
+            jobs.append(job)
+        return jobs
+
+    def update(self) -> None:
+        """Record the pruning of what has changed, before what asks the field."""
+        dirty = [i for i, made in enumerate(self._objects) if made.dirty and made.levels]
+        for made in self._objects:
+            made.dirty = False
+        if not dirty:
+            return
+        gpu = self._gpu
+        jobs = {i: self._jobs(i) for i in dirty}
+        listed = [job for made in jobs.values() for job in made]
+        table = np.zeros(len(listed), gpu.dtype(_JOB))
+        for number, job in enumerate(listed):
+            table[number] = job
+        gpu.write(self._job_buffer, table)
+        for i in dirty:
+            gpu.encoder.clear_buffer(self._counter_buffer.native, 4 * _COUNTERS * i, 4 * _COUNTERS)
+        scope = {
+            **{name: bound for name, bound in self.bindings.items() if name in ("implicit_objects", "implicit_slots")},
+            "implicit_lists": self._list_buffer.read_write(),
+            "implicit_cells": self._cell_buffer.read_write(),
+            "implicit_counters": self._counter_buffer.read_write(),
+            "implicit_marks": self._mark_buffer.read_write(),
+            "implicit_jobs": self._job_buffer.read(),
+        }
+        number = 0
+        for i in dirty:
+            for job in jobs[i]:
+                if int(job["is_root"]) == 0:  # marks of one level are read before the next one begins
+                    gpu.encoder.clear_buffer(self._counter_buffer.native, 4 * (_COUNTERS * i + 2), 4)
+                parents = int(np.prod(job["parent_counts"]))
+                gpu.compute("implicit.prune", _PRUNE, "prune").bind(
+                    scope, implicit_job=gpu.constant(number)
+                ).dispatch_line(64 * parents)
+                number += 1
+
+    def counters(self) -> NDArray[np.uint32]:
+        """(objects, 2): entries of lists that pruning used, or wanted, and cells that had to keep their parent's.
+
+        Waits for the device.
+        """
+        return self._gpu.read_buffer(self._counter_buffer).view(np.uint32).reshape(-1, _COUNTERS)[:, :2]
+
+    # --- life ---
+
+    @property
+    def is_trusted(self) -> bool:
+        """Whether no user's code is in it."""
+        return self._kinds.is_trusted
+
+    @property
+    def size(self) -> int:
+        """Instructions of all objects."""
+        return sum(made.program.size for made in self._objects)
+
+    def resources(self) -> list[Resource]:
+        """What it holds on the device."""
+        return [*self._buffers, *([self._params] if self._params else [])]
+
+    def close(self) -> None:
+        """Free all device memory."""
+        for resource in self.resources():
+            resource.destroy()
+        self._buffers.clear()
+        self._params = None
+        self._gpu.forget_groups()

@@ -1,0 +1,444 @@
+"""A shape as a program for the device: instructions in post-order, and the numbers that they work with.
+
+An instruction is two words: what to do, and where in the *slots* its numbers are. Its first word::
+
+    bits  0 … 15  code     which primitive or modifier, as :class:`Kinds` numbers them
+    bits 16 … 19  type     LEAF, COMBINE, ENTER, LEAVE
+    bits 20 … 23  join     how a value joins the one before it: PUSH, UNION, INTERSECT, SUBTRACT
+    bits 24 … 25  blend    HARD, POLYNOMIAL, EXPONENTIAL, ROOT
+    bit  26       NEGATE   the value is taken negative: what is left of ``a − b`` where a does not matter
+    bit  27       TURNED   the leaf's place is turned, not only moved
+    bit  28       PLACED   of ENTER and LEAVE: it changes the place; of LEAVE also: the one before comes back
+    bit  29       BORROWS  the leaf has no material of its own and cuts: what it cuts keeps its material
+    bit  30       OPAQUE   of ENTER and LEAVE: nothing inside is pruned
+
+A leaf joins what came before it at once, so that a union of a thousand spheres needs no stack. What remains of a
+program where some nodes do not matter is a part of it in the same order, with a join here and there turned into a PUSH
+(or a COMBINE into the negation of its second value); so the lists that pruning makes are programs as well.
+
+Slots, in vec4f; ``k`` is the width of a smooth join, ``L`` the Lipschitz bound of the value in the object's space:
+
+- LEAF: ``(translation, factor) (a) (b) (k, L, material or −1, −)``, and where it may be turned the three rows of the
+  transform from the object's to the leaf's space. The translation is subtracted; the rows hold theirs themselves.
+- COMBINE: ``(k, L, −, −)``.
+- ENTER and LEAVE of a modifier: ``(a) (b) (−, L, −, −)``; of an affine transform (code AFFINE) ``(row) (row) (row)
+  (factor, L, −, −)``.
+
+Affine transforms are multiplied into the leaves below, except around what changes places by itself and around parts
+with a name, which move as one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tyndall.gpu.params import ParameterError
+from tyndall.scene.model import Material
+from tyndall.sdf.shape import (
+    Combination,
+    Floats,
+    Modifier,
+    Named,
+    Operation,
+    Painted,
+    Primitive,
+    Shape,
+    Transformed,
+)
+
+LEAF, COMBINE, ENTER, LEAVE = range(4)
+PUSH, UNION, INTERSECT, SUBTRACT = range(4)
+HARD, POLYNOMIAL, EXPONENTIAL, ROOT = range(4)
+NEGATE, TURNED, PLACED, BORROWS, OPAQUE = (1 << bit for bit in range(26, 31))
+AFFINE = 0xFFFF
+
+_JOINS: dict[Operation, int] = {"union": UNION, "intersection": INTERSECT, "subtraction": SUBTRACT}
+_BLENDS = {"polynomial": POLYNOMIAL, "exponential": EXPONENTIAL, "root": ROOT}
+_MOST_NODES = 1 << 20
+
+
+class Kinds:
+    """The primitives and modifiers of some programs, numbered as their first instructions come.
+
+    Attributes:
+        version: grows with every new one: shaders that know fewer must be made anew.
+    """
+
+    def __init__(self) -> None:
+        self._primitives: dict[Any, tuple[int, Primitive]] = {}
+        self._modifiers: dict[Any, tuple[int, Modifier]] = {}
+        self.version = 0
+
+    def of(self, shape: Primitive | Modifier) -> int:
+        """Its number; the same for all whose WESL is the same."""
+        known: dict[Any, tuple[int, Any]] = self._primitives if isinstance(shape, Primitive) else self._modifiers
+        key = _source(shape)
+        if key not in known:
+            known[key] = len(known), shape
+            self.version += 1
+        return known[key][0]
+
+    @property
+    def is_trusted(self) -> bool:
+        """Whether none of them is a user's code."""
+        shapes = [shape for _, shape in (*self._primitives.values(), *self._modifiers.values())]
+        return not any(getattr(shape, "untrusted", False) for shape in shapes)
+
+    def wesl(self) -> str:
+        """Text for the bindings module: ``implicit_primitive``, ``implicit_enter`` and ``implicit_leave``."""
+        leaf, enter, leave, texts = [], [], [], []
+        for code, shape in self._primitives.values():
+            b = "implicit_slots[at + 1u]" if len(shape.numbers) > 4 or _payload(shape) is not None else "vec4f(0.0)"
+            leaf.append((code, f"{_function(shape)}(p, implicit_slots[at], {b})"))
+            texts.append(getattr(shape, "wesl", ""))
+        for code, modifier in self._modifiers.values():
+            numbers = "implicit_slots[at], implicit_slots[at + 1u]"
+            if modifier.warps:
+                enter.append((code, f"{_function(modifier)}_enter(p, {numbers})"))
+            if modifier.adjusts:
+                leave.append((code, f"{_function(modifier)}_leave(d, p, {numbers})"))
+            texts.append(getattr(modifier, "wesl", ""))
+        return "\n".join(
+            [
+                *dict.fromkeys(text for text in texts if text),
+                _switch("implicit_primitive(code: u32, p: vec3f, at: u32) -> f32", leaf, "0.0"),
+                _switch("implicit_enter(code: u32, p: vec3f, at: u32) -> vec3f", enter, "p"),
+                _switch("implicit_leave(code: u32, d: f32, p: vec3f, at: u32) -> f32", leave, "d"),
+            ]
+        )
+
+
+def _source(shape: Primitive | Modifier) -> Any:
+    return getattr(shape, "source", None) or type(shape)
+
+
+def _function(shape: Primitive | Modifier) -> str:
+    """The WESL function, with its module."""
+    if hasattr(shape, "wesl"):  # a user's, in the same text
+        return str(shape.function)  # type: ignore[union-attr]
+    default = "modifiers" if isinstance(shape, Modifier) else "profiles" if shape.dimension == 2 else "solids"
+    return f"{getattr(shape, 'module', None) or f'package::sdf::{default}'}::{shape.code}"
+
+
+def _payload(shape: Primitive) -> NDArray[np.float32] | None:
+    """Samples of a field that is no formula."""
+    return getattr(shape, "payload", None)
+
+
+def _switch(signature: str, cases: Sequence[tuple[int, str]], otherwise: str) -> str:
+    lines = [f"case {code}u: {{ return {value}; }}" for code, value in cases]
+    body = (
+        f"switch code {{ {' '.join(lines)} default: {{ return {otherwise}; }} }}" if cases else f"return {otherwise};"
+    )
+    return f"fn {signature} {{ {body} }}"
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A named part: where its place is in the slots, and what it is placed by, before and after its own motion.
+
+    Attributes:
+        slot: the first vec4f of its leaf or its transform.
+        entry: its instruction, and that of the LEAVE of a transform; −1 for a leaf.
+        leaf: whether it is one leaf.
+        before, after: 4×4, from its parent's space to the object's (or the scope's), and from its own to its parent's.
+        factor: distances at rest, of the leaf or the transform.
+        shape: what is placed, a leaf's primitive among it.
+    """
+
+    slot: int
+    entry: int
+    leave: int
+    leaf: bool
+    before: Floats
+    after: Floats
+    factor: float
+    shape: Shape
+
+
+@dataclass(eq=False)
+class Program:
+    """A compiled shape.
+
+    Attributes:
+        words: (n, 2) uint32, its instructions; slots are numbered from 0.
+        slots: (m, 4) float32.
+        names: the parts of each name, in the order in which they appear.
+        materials: in the order of their numbers in the slots.
+        values: the deepest stack of values.
+        places: the deepest stack of places.
+        lipschitz: L of the whole.
+        material_rows: slots whose third number is a material's, or −1.
+        payload_rows: slots whose first number is that of another slot, where samples begin.
+    """
+
+    words: NDArray[np.uint32]
+    slots: NDArray[np.float32]
+    names: Mapping[str, list[Part]]
+    materials: list[Material]
+    values: int
+    places: int
+    lipschitz: float
+    material_rows: NDArray[np.intp]
+    payload_rows: NDArray[np.intp]
+
+    @property
+    def size(self) -> int:
+        """Instructions."""
+        return len(self.words)
+
+
+def compile_shape(shape: Shape, kinds: Kinds) -> Program:
+    """The program of a solid shape.
+
+    Raises:
+        ParameterError: a flat shape, one of more than a million nodes, or one that is repeated for ever inside
+            another such one.
+    """
+    return _Compiler(kinds).compile(shape)
+
+
+@dataclass
+class _Context:
+    """What surrounds a node: its pending transform, and what its leaves inherit."""
+
+    matrix: Floats
+    factor: float = 1.0
+    material: Material | None = None
+    cuts: bool = False
+    stretch: float = 1.0
+    name: str = ""
+    before: Floats | None = None  # of the name: the transform around it
+
+    @property
+    def is_placed(self) -> bool:
+        return not np.array_equal(self.matrix, np.eye(4))
+
+
+class _Compiler:
+    def __init__(self, kinds: Kinds) -> None:
+        self._kinds = kinds
+        self._words: list[tuple[int, int]] = []
+        self._rows: list[Any] = []
+        self._payloads: dict[int, tuple[int, Any]] = {}
+        self._names: dict[str, list[Part]] = {}
+        self._materials: dict[int, tuple[int, Material]] = {}
+        self._depth = self._places = self._deepest = self._most_places = 0
+        self._material_rows: list[int] = []
+        self._payload_rows: list[int] = []
+
+    def compile(self, shape: Shape) -> Program:
+        if shape.dimension != 3:
+            raise ParameterError(f"shape: {type(shape).__name__} is flat; extrude or revolve it")
+        if shape.count > _MOST_NODES:
+            raise ParameterError(f"shape: {shape.count:,} nodes; {_MOST_NODES:,} are the most")
+        self._emit(shape, _Context(np.eye(4)), PUSH, HARD, 0.0)
+        return Program(
+            np.array(self._words, np.uint32).reshape(-1, 2),
+            np.array(self._rows, np.float32).reshape(-1, 4),
+            self._names,
+            [material for _, material in self._materials.values()],
+            self._deepest,
+            self._most_places,
+            shape.lipschitz,
+            np.array(self._material_rows, np.intp),
+            np.array(self._payload_rows, np.intp),
+        )
+
+    # A node leaves one value: pushed, or joined to the value before it where ``join`` is not PUSH.
+
+    def _emit(self, shape: Shape, c: _Context, join: int, blend: int, k: float) -> None:
+        match shape:
+            case Painted():
+                self._emit(shape.shape, replace(c, material=shape.surface), join, blend, k)
+            case Named() if not _is_leaf(shape.shape):
+                self._scope(shape.shape, c, shape.name)
+                self._join(join, blend, k, shape.lipschitz * c.stretch)
+            case Named():
+                self._emit(shape.shape, replace(c, name=shape.name, before=c.matrix, matrix=np.eye(4)), join, blend, k)
+            case Transformed():
+                inside = replace(c, matrix=c.matrix @ shape.placement, factor=c.factor * shape.factor)
+                self._emit(shape.shape, inside, join, blend, k)
+            case Primitive():
+                self._leaf(shape, c, join, blend, k)
+            case Combination():
+                self._combination(shape, c, join, blend, k)
+            case Modifier():
+                self._modifier(shape, c)
+                self._join(join, blend, k, shape.lipschitz * c.stretch)
+            case _ if hasattr(shape, "copies"):
+                self._emit(Combination(tuple(shape.copies())), c, join, blend, k)
+            case _:
+                self._forever(shape, c)
+                self._join(join, blend, k, shape.lipschitz * c.stretch)
+
+    def _put(self, *rows: Sequence[float]) -> int:
+        at = len(self._rows)
+        self._rows.extend(rows)
+        return at
+
+    def _word(
+        self, kind: int, code: int = 0, join: int = PUSH, blend: int = HARD, flags: int = 0, slot: int = 0
+    ) -> None:
+        self._words.append((code | kind << 16 | join << 20 | blend << 24 | flags, slot))
+
+    def _pushed(self) -> None:
+        self._depth += 1
+        self._deepest = max(self._deepest, self._depth)
+
+    def _join(self, join: int, blend: int, k: float, lipschitz: float) -> None:
+        """Join the last value, which was pushed, to the one before."""
+        if join != PUSH:
+            self._word(COMBINE, join=join, blend=blend, slot=self._put((k, lipschitz, 0, 0)))
+            self._depth -= 1
+
+    def _leaf(self, shape: Primitive, c: _Context, join: int, blend: int, k: float) -> None:
+        placement = c.matrix if c.before is None else c.before @ c.matrix
+        turned = not np.array_equal(placement[:3, :3], np.eye(3))
+        flags = (TURNED if turned else 0) | (BORROWS if c.cuts and c.material is None else 0)
+        numbers = [float(x) for x in shape.numbers]
+        if len(numbers) > 8:
+            raise ParameterError(f"{type(shape).__name__}: {len(numbers)} numbers; a primitive has at most 8")
+        numbers += [0.0] * (8 - len(numbers))
+        if (payload := _payload(shape)) is not None:
+            numbers[0] = float(self._payload(payload))
+            self._payload_rows.append(len(self._rows) + 1)
+        slot = self._put(
+            (*placement[:3, 3], c.factor),
+            numbers[:4],
+            numbers[4:],
+            (k, shape.lipschitz * c.stretch, float(self._material(c.material)), 0),
+        )
+        self._material_rows.append(slot + 3)
+        if turned or c.name:
+            self._put(*np.linalg.inv(placement)[:3])
+        if c.name:
+            assert c.before is not None
+            part = Part(slot, len(self._words), -1, True, c.before, c.matrix, c.factor, shape)
+            self._names.setdefault(c.name, []).append(part)
+        self._word(LEAF, self._kinds.of(shape), join, blend, flags, slot)
+        if join == PUSH:
+            self._pushed()
+
+    def _material(self, material: Material | None) -> int:
+        if material is None:
+            return -1
+        return self._materials.setdefault(id(material), (len(self._materials), material))[0]
+
+    def _payload(self, samples: NDArray[np.float32]) -> int:
+        """The first vec4f of some samples, which several leaves may share."""
+        if id(samples) not in self._payloads:
+            padded = np.zeros(-(-samples.size // 4) * 4, np.float32)
+            padded[: samples.size] = samples.ravel()
+            self._payloads[id(samples)] = self._put(*padded.reshape(-1, 4)), samples
+        return self._payloads[id(samples)][0]
+
+    def _combination(self, shape: Combination, c: _Context, join: int, blend: int, k: float) -> None:
+        children, inner = list(shape.shapes), _JOINS[shape.operation]
+        if len(children) == 1:
+            self._emit(children[0], c, join, blend, k)
+            return
+        if shape.smooth == 0:
+            if join == inner != SUBTRACT and blend == HARD:
+                for child in children:  # a union in a union
+                    self._emit(child, c, join, HARD, 0.0)
+                return
+            if shape.operation != "subtraction":
+                children.sort(key=lambda child: not _is_deep(child))  # what needs a stack comes first
+            for i, child in enumerate(children):
+                cuts = shape.operation == "subtraction" and i > 0
+                self._emit(child, _cutting(c, cuts), inner if i else PUSH, HARD, 0.0)
+        else:
+            width, kind = shape.smooth * c.factor, _BLENDS[shape.blend]
+            if shape.operation == "subtraction":
+                self._emit(children[0], c, PUSH, HARD, 0.0)
+                rest = children[1:]
+                if len(rest) == 1:
+                    self._emit(rest[0], _cutting(c, True), SUBTRACT, kind, width)
+                else:
+                    self._pairs(rest, _cutting(c, True), UNION, kind, width, PUSH, HARD, 0.0)
+                    self._join(SUBTRACT, kind, width, shape.lipschitz * c.stretch)
+            else:
+                self._pairs(children, c, inner, kind, width, PUSH, HARD, 0.0)
+        self._join(join, blend, k, shape.lipschitz * c.stretch)
+
+    def _pairs(
+        self, shapes: list[Shape], c: _Context, inner: int, kind: int, width: float, join: int, blend: int, k: float
+    ) -> None:
+        """Smooth joins of neighbours by pairs, as :meth:`Combination.distance` takes them."""
+        if len(shapes) == 1:
+            self._emit(shapes[0], c, join, blend, k)
+            return
+        # Pairing from the left gives a first half of a power of two.
+        half = 1 << (len(shapes) - 1).bit_length() - 1
+        self._pairs(shapes[:half], c, inner, kind, width, PUSH, HARD, 0.0)
+        if len(shapes) - half == 1:
+            self._emit(shapes[half], c, inner, kind, width)
+        else:
+            self._pairs(shapes[half:], c, inner, kind, width, PUSH, HARD, 0.0)
+            self._join(inner, kind, width, max(shape.lipschitz for shape in shapes) * c.stretch)
+        self._join(join, blend, k, max(shape.lipschitz for shape in shapes) * c.stretch)
+
+    def _scope(self, shape: Shape, c: _Context, name: str = "") -> None:
+        """A shape inside its pending transform as instructions of their own; a named one always has them."""
+        factor = c.factor
+        slot = self._put(*np.linalg.inv(c.matrix)[:3], (factor, shape.lipschitz * c.stretch, 0, 0))
+        entry = len(self._words)
+        self._word(ENTER, AFFINE, flags=PLACED, slot=slot)
+        self._entered()
+        inside = replace(c, matrix=np.eye(4), factor=1.0, stretch=c.stretch / factor, name="", before=None)
+        self._emit(shape, inside, PUSH, HARD, 0.0)
+        self._places -= 1
+        if name:
+            part = Part(slot, entry, len(self._words), False, c.matrix, np.eye(4), factor, shape)
+            self._names.setdefault(name, []).append(part)
+        self._word(LEAVE, AFFINE, flags=PLACED, slot=slot)
+
+    def _entered(self) -> None:
+        self._places += 1
+        self._most_places = max(self._most_places, self._places)
+
+    def _modifier(self, shape: Modifier, c: _Context) -> None:
+        needs_place = shape.warps or getattr(shape, "placed", True)
+        if (c.is_placed and needs_place) or c.factor != 1.0:
+            self._scope(shape, c)
+            return
+        numbers = [float(x) for x in shape.numbers]
+        if len(numbers) > 8:
+            raise ParameterError(f"{type(shape).__name__}: {len(numbers)} numbers; a modifier has at most 8")
+        numbers += [0.0] * (8 - len(numbers))
+        code = self._kinds.of(shape)
+        slot = self._put(numbers[:4], numbers[4:], (0, shape.lipschitz * c.stretch, 0, 0))
+        if shape.warps:
+            self._word(ENTER, code, flags=PLACED, slot=slot)
+            self._entered()
+        inside = replace(c, stretch=c.stretch * shape.stretch)
+        self._emit(shape.shape, inside, PUSH, HARD, 0.0)
+        if shape.warps:
+            self._places -= 1
+        if shape.warps or shape.adjusts:
+            self._word(LEAVE, code, flags=PLACED if shape.warps else 0, slot=slot)
+
+    def _forever(self, shape: Shape, c: _Context) -> None:
+        raise ParameterError(f"shape: a {type(shape).__name__} has no program")
+
+
+def _cutting(c: _Context, cuts: bool) -> _Context:
+    return replace(c, cuts=True, material=None) if cuts else c
+
+
+def _is_leaf(shape: Shape) -> bool:
+    """Whether it is a primitive, painted and placed at most."""
+    while isinstance(shape, (Painted, Transformed)):
+        shape = shape.shape
+    return isinstance(shape, Primitive)
+
+
+def _is_deep(shape: Shape) -> bool:
+    """Whether it needs more than one instruction."""
+    return not _is_leaf(shape.shape if isinstance(shape, Named) else shape)
