@@ -148,6 +148,13 @@ class View:
         assert isinstance(made, Buffer)
         return made
 
+    def fitted(self, label: str, make: Callable[[], NDArray[Any]], *, element: str) -> Buffer:
+        """As :meth:`buffer`, of what depends on the scene's box; written anew when that changes."""
+        made = self.buffer(label, make, element=element)
+        box = tuple(corner.tobytes() for corner in self.scene.bounds)
+        self.keep(f"{label} fitted", box, lambda: self.gpu.write(made, make()))
+        return made
+
     def keep(self, label: str, key: Any, make: Callable[[], Any]) -> Any:
         """What was made for this label, of nothing that must be destroyed; made anew when the key changes."""
         if label not in self._kept or self._kept[label][0] != key:
@@ -192,6 +199,7 @@ class View:
                 make_world=self.make_world,
             )
             self._parts[label] = made
+        made.scene = self.scene
         made.images, made.scope, made.overlay, made.frame = self.images, self.scope, self.overlay, self.frame
         made.camera, made.maps_wanted, made.air_wanted = self.camera, self.maps_wanted, self.air_wanted
         made.fields = self.fields
