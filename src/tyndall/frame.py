@@ -320,6 +320,7 @@ class Renderer(Closing):
     def _view(self, family: str, scope: dict[str, Any] | None = None, overlay: dict[str, str] | None = None) -> View:
         view = self._views[family]
         view.scope, view.overlay, view.frame = scope or self._scope, overlay or {}, self._frame
+        view.fields = self._fields.field if self._fields else None
         if self._camera_seen is not None:
             view.camera = self._camera_seen
         return view

@@ -31,6 +31,15 @@ BOX = Implicit(box(1).at(0, 0.9, 0))
 AS_MESH = props.box((-0.5, 0.4, -0.5), (0.5, 1.4, 0.5))
 
 
+LARGER = props.box((-0.54, 0.36, -0.54), (0.54, 1.44, 0.54))
+
+
+def on_floor(size: tuple[int, int] = SIZE) -> np.ndarray:
+    """(H, W): which pixels show the floor beside the box, not its silhouette."""
+    seen = props.rays(ABOVE, size)
+    return np.isinf(props.cast(Scene([LARGER]), seen.origin, seen.directions).distance)
+
+
 def received(gpu: Gpu, scene: Scene, **changes: Any) -> np.ndarray:
     return props.shade(gpu, scene, FieldShadows(**changes), SIZE)
 
@@ -55,7 +64,7 @@ def test_hard_shadows_are_the_rays_answers(gpu: Gpu, light: Light) -> None:
     got = received(gpu, scene)
     meshes = Scene([AS_MESH], [light])
     points = floor_points(ABOVE)
-    onto = np.abs(points[..., [0, 2]]).max(-1) < 3.9
+    onto = (np.abs(points[..., [0, 2]]).max(-1) < 3.9) & on_floor()
     truth = props.lit(meshes, light, points)
     sure = onto.copy()
     for shift in 2e-2 * np.concatenate([np.eye(3)[[0, 2]], -np.eye(3)[[0, 2]]]):
@@ -133,9 +142,7 @@ def test_soft_shadows_of_all_kinds_of_light_are_near_the_truth(gpu: Gpu, light: 
     got = received(gpu, Scene([props.floor(0, 4)], [light], ABOVE, implicits=[BOX]))[::2, ::2]
     pcss = props.shade(gpu, Scene([props.floor(0, 4), AS_MESH], [light], ABOVE), "pcss", SIZE)[::2, ::2]
     points = floor_points(ABOVE)[::2, ::2]
-    seen = props.rays(ABOVE, SIZE)
-    visible = np.isinf(props.cast(Scene([AS_MESH]), seen.origin, seen.directions[::2, ::2]).distance)
-    sure = (np.abs(points[..., [0, 2]]).max(-1) < 3.5) & visible
+    sure = (np.abs(points[..., [0, 2]]).max(-1) < 3.5) & on_floor()[::2, ::2]
     truth = seen_parts(light, points[sure])
     assert ((truth > 0) & (truth < 1)).mean() > 0.02
     assert abs((got[sure] - truth).mean()) < 1.5e-3
@@ -191,8 +198,7 @@ def test_the_air_is_asked_too(gpu: Gpu) -> None:
     want = props.shoot(gpu, of_mesh, (48, 36), shadow="ray_traced", volumetric=march).inscattered
     got = props.shoot(gpu, of_field, (48, 36), shadow=FieldShadows(), volumetric=march).inscattered
     lit = props.shoot(gpu, of_mesh.with_(instances=of_mesh.instances[:1]), (48, 36), volumetric=march).inscattered
-    beside = props.rays(ABOVE, (48, 36))
-    floor = np.isinf(props.cast(Scene([AS_MESH]), beside.origin, beside.directions).distance)
+    floor = on_floor((48, 36))
     assert (want[floor] < 0.95 * lit[floor]).sum() > 50
     assert props.difference(got[floor], want[floor]) < 0.05
 
