@@ -90,11 +90,14 @@ class Kinds:
         return not any(getattr(shape, "untrusted", False) for shape in shapes)
 
     def wesl(self) -> str:
-        """Text for the bindings module: ``implicit_primitive``, ``implicit_enter`` and ``implicit_leave``."""
-        leaf, enter, leave, texts = [], [], [], []
+        """Text for the bindings module: ``implicit_primitive``, its numbers in the slots or given, ``implicit_enter`` and
+        ``implicit_leave``.
+        """
+        leaf, leaf_of, enter, leave, texts = [], [], [], [], []
         for code, shape in self._primitives.values():
             b = "implicit_slots[at + 1u]" if len(shape.numbers) > 4 or _payload(shape) is not None else "vec4f(0.0)"
             leaf.append((code, f"{_function(shape)}(p, implicit_slots[at], {b})"))
+            leaf_of.append((code, f"{_function(shape)}(p, a, b)"))
             texts.append(getattr(shape, "wesl", ""))
         for code, modifier in self._modifiers.values():
             numbers = "implicit_slots[at], implicit_slots[at + 1u]"
@@ -107,6 +110,7 @@ class Kinds:
             [
                 *dict.fromkeys(text for text in texts if text),
                 _switch("implicit_primitive(code: u32, p: vec3f, at: u32) -> f32", leaf, "0.0"),
+                _switch("implicit_primitive_of(code: u32, p: vec3f, a: vec4f, b: vec4f) -> f32", leaf_of, "0.0"),
                 _switch("implicit_enter(code: u32, p: vec3f, at: u32) -> vec3f", enter, "p"),
                 _switch("implicit_leave(code: u32, d: f32, p: vec3f, at: u32) -> f32", leave, "d"),
             ]
