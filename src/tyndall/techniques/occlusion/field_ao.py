@@ -2,17 +2,18 @@
 
 How much of the sky a surface sees is asked of the field in a few directions: along each of them, the least distance to
 anything as a part of the way gone says how wide a cone is free (Evans 2006, *Fast approximations for global
-illumination on dynamic scenes*; Quilez's five taps along the normal are the cheapest form of it). Here the numbers have a
-meaning: the hemisphere, weighed by the cosine, is the unit disk in the surface's plane (Nusselt's analogon), and seven
-smaller disks stand for it, one in its middle and six around it, which have together its centre and spread. Each is a
-cone of directions with as much of the ambient light; in it a wall is a straight line, and what it leaves of the disk is
-``1/2 + (s·√(1 − s²) + arcsin s)/π``, with ``s`` the distance to the line in the disk's radii.
+illumination on dynamic scenes*; Quilez's five taps along the normal are the cheapest form of it). Here the numbers
+have a meaning: the hemisphere, weighed by the cosine, is the unit disk in the surface's plane (Nusselt's analogon),
+and seven smaller disks stand for it, one in its middle and six around it, which have together its centre and spread.
+Each is a cone of directions with as much of the ambient light; in it a wall is a straight line, and what it leaves of
+the disk is ``1/2 + (s·√(1 − s²) + arcsin s)/π``, with ``s`` the distance to the line in the disk's radii.
 
-So an open plane is exactly open. In the corner of a floor and a wall that is ``x`` away it is within 0.03 of the closed
-form ``1 − (arccos k − k·√(1 − k²))/π, k = x/radius``, with no noise and no factor to be tuned; nothing fades towards the
-radius, as in :mod:`~tyndall.techniques.occlusion.ray_traced_ao`. Where a cone's axis meets something, how deep it goes in
-says how much of the cone is hidden besides, and a wall that is thinner than that is taken to go on behind where it was
-met. Where a floor meets two walls, a quarter is open; seven cones say 0.31.
+So an open plane is exactly open. In the corner of a floor and a wall that is ``x`` away it is within 0.02 of the
+closed form ``1 − (arccos k − k·√(1 − k²))/π, k = x/radius``, with no noise and no factor to be tuned; nothing fades
+towards the radius, as in :mod:`~tyndall.techniques.occlusion.ray_traced_ao`. Where a cone's axis meets something, how
+deep it goes in says how much of the cone is hidden besides, and a wall is taken to go on to the radius behind where it
+was met. Where a floor meets two walls, a quarter is open, and seven cones say up to 0.33; below a ball that all but
+rests on the floor they say 0.15 less than the form factor.
 
 Meshes receive it, but only implicit surfaces occlude.
 """

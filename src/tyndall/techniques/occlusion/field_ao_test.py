@@ -69,8 +69,7 @@ def test_a_corner_is_as_open_as_the_closed_form(gpu: Gpu, thickness: float, turn
     off = (got - corner(away))[sure]
     assert away[sure].min() < 0.25
     assert away.max() > 1.5
-    print(thickness,turn,np.abs(off).max(), off.mean())
-    assert np.abs(off).max() < 0.03
+    assert np.abs(off).max() < 0.02
     assert abs(off.mean()) < 0.01
 
 
@@ -84,7 +83,7 @@ def test_a_deep_corner_is_a_quarter_open(gpu: Gpu) -> None:
     points = seen.at(-seen.origin[1] / seen.directions[..., 1])
     inside = (points[..., [0, 2]] > 0.002).all(-1)
     assert inside.sum() > 100
-    np.testing.assert_allclose(got[inside], 0.25, atol=0.07)
+    np.testing.assert_allclose(got[inside], 0.25, atol=0.09)
 
 
 def test_a_ball_over_a_floor_hides_its_form_factor(gpu: Gpu) -> None:
@@ -94,8 +93,7 @@ def test_a_ball_over_a_floor_hides_its_form_factor(gpu: Gpu) -> None:
         ball = Implicit(sphere(1).at(0, height, 0))
         scene = Scene([props.floor(0, 20)], camera=camera, ambient=AMBIENT, implicits=[ball])
         got = opening(gpu, scene, FieldAo(radius=10.0))[16:20, 22:26].mean()
-        print(height, got)
-        assert got == pytest.approx(1 - 1 / height**2, abs=0.1)
+        assert got == pytest.approx(1 - 1 / height**2, abs=0.15)
 
 
 def test_only_the_ambient_light_is_dimmed(gpu: Gpu) -> None:
