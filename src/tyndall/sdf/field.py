@@ -20,14 +20,14 @@ of primitives that are in use.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tyndall.gpu.device import Gpu
+from tyndall.gpu.device import ComputePass, Gpu
 from tyndall.gpu.resources import Buffer, Closing, ParamsBuffer, Resource
 from tyndall.scene.model import Implicit
 from tyndall.sdf.marching import Marching
@@ -45,6 +45,9 @@ _COARSE, _FINE = 16, 64  # cells along the longest side, of both levels
 _COUNTERS = 8  # of an object: entries used, overflows, words of marks used at each level
 _LEAST_ENTRIES, _MOST_ENTRIES = 1 << 12, 1 << 23
 _PART_SIZE = 4096  # instructions for which one part is enough
+_LONG = 512  # instructions: a longer program's leaves are sorted out first
+_LONGEST = 32 * 1024  # of those; beyond, cells walk all of it; as in prune.wesl
+_SEGMENT = 256  # of them, as in prune.wesl
 _FEW_MARKS = 128  # instructions whose marks need no memory; as in prune.wesl
 _MOST_MARKS = 1 << 23  # words
 
@@ -148,6 +151,14 @@ class Field(Closing):
         marks = int(np.clip(_FINE**3 * -(-(longest - _FEW_MARKS) // 16), 64, _MOST_MARKS))
         self._marks_capacity = marks
         self._mark_buffer = self._buffer("marks", 4 * marks, "u32")
+        words = max((-(-o.program.size // 32) for o in self._objects if self._is_long(o)), default=0)
+        self._alive_buffer = self._buffer("alive", 4 * max(1, _COARSE**3 * words), "u32")
+        self._least_buffer = self._buffer("least", 4 * (_COARSE**3 if words else 1), "atomic<u32>")
+        spans = np.zeros((max(1, self._words.shape[0]), 2), np.uint32)
+        for made in self._objects:
+            if self._is_long(made):
+                spans[made.first_word : made.first_word + made.program.size] = made.program.spans
+        self._span_buffer = self._buffer("spans", spans, "vec2u")
         most_jobs = sum(o.levels + o.program.size // _PART_SIZE for o in self._objects)
         self._job_buffer = self._buffer("jobs", self._gpu.dtype(_JOB).itemsize * max(1, most_jobs), _JOB)
         self._material_buffer = self._buffer("materials", self._materials(), _MATERIAL)
@@ -263,8 +274,14 @@ class Field(Closing):
                 job["first_entry"], job["capacity"] = made.first_entry, made.capacity
                 job["counters"] = _COUNTERS * index
                 job["marks_capacity"] = self._marks_capacity
+                job["alive_words"] = -(-made.program.size // 32) if self._is_long(made) and level == 0 else 0
+                job["margin"], job["lipschitz"] = made.program.margin, made.program.lipschitz
                 jobs.append(job)
         return jobs
+
+    def _is_long(self, made: _Object) -> bool:
+        """Whether its leaves are sorted out before the coarse cells walk its program."""
+        return made.levels > 1 and _LONG < made.program.size <= _LONGEST
 
     def update(self) -> None:
         """Record the pruning of what has changed, before what asks the field."""
@@ -289,13 +306,26 @@ class Field(Closing):
             "implicit_counters": self._counter_buffer.read_write(),
             "implicit_marks": self._mark_buffer.read_write(),
             "implicit_jobs": self._job_buffer.read(),
+            "implicit_least": self._least_buffer.read_write(),
+            "implicit_alive": self._alive_buffer.read_write(),
+            "implicit_spans": self._span_buffer.read(),
         }
         for number, job in enumerate(listed):
             if number:  # one job's marks are read before the next one begins
                 gpu.encoder.clear_buffer(self._counter_buffer.native, 4 * (int(job["counters"]) + 2), 4)
-            gpu.compute("implicit.prune", _PRUNE, "prune").bind(scope, implicit_job=gpu.constant(number)).features(
-                shared_loads=gpu.adapter_info["adapter_type"] != "CPU"
-            ).dispatch_line(64 * int(job["block_count"]))
+            here = {**scope, "implicit_job": gpu.constant(number)}
+            if int(job["alive_words"]):
+                gpu.clear_buffer(self._least_buffer)
+                size = 64 * int(job["block_count"]), -(-int(job["count"]) // _SEGMENT)
+                self._pass("bound_leaves", here).dispatch(*size)
+                self._pass("find_alive", here).dispatch(*size)
+                self._pass("emit_alive", here).dispatch_line(64 * int(np.prod(job["counts"])))
+                continue
+            self._pass("prune", here).dispatch_line(64 * int(job["block_count"]))
+
+    def _pass(self, entry: str, scope: Mapping[str, Any]) -> ComputePass:
+        shared = self._gpu.adapter_info["adapter_type"] != "CPU"  # see prune.wesl
+        return self._gpu.compute(f"{self._owner}.{entry}", _PRUNE, entry).bind(scope).features(shared_loads=shared)
 
     def counters(self) -> NDArray[np.uint32]:
         """(objects, 2): entries of lists that pruning used, or wanted, and cells that had to keep their parent's.
