@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import numpy as np
 import props
 import pytest
 
+import tyndall.sdf
 from tyndall.frame import Renderer
 from tyndall.gpu.device import Gpu, GpuError
 from tyndall.gpu.params import fields_of
@@ -16,6 +18,7 @@ from tyndall.lab.truth import TruthSettings, trace
 from tyndall.scene.model import (
     DirectionalLight,
     Image,
+    Implicit,
     Instance,
     Material,
     Medium,
@@ -25,6 +28,7 @@ from tyndall.scene.model import (
     SpotLight,
     Texture,
 )
+from tyndall.sdf import box, sphere, union
 from tyndall.techniques import FAMILIES
 from tyndall.techniques.contract import Unsupported
 from tyndall.techniques.shadow.depth_maps import IN_WORDS
@@ -94,6 +98,13 @@ def test_every_entry_point_compiles_and_is_used(gpu: Gpu, monkeypatch: pytest.Mo
     solid = Scene(SHAPES[:2], LIGHTS[:1], props.AHEAD)  # maps of what has holes are not drawn in compute
     with Renderer(solid, (8, 6), gpu=gpu, shadow=ShadowMap(size=64, rasterizer="compute")) as renderer:
         renderer.draw()
+    shape = union(*[solid(size) for size in (0.3, 0.4, 0.5) for solid in (sphere, box)], smooth=0.1)
+    surfaces = [Implicit(shape, _mirror, Material(emissive=(1, 1, 1)))]
+    fields = Scene(SHAPES[:1], LIGHTS[:1], props.AHEAD, implicits=surfaces)
+    with Renderer(fields, (8, 6), gpu=gpu, shadow=ShadowMap(size=64)) as renderer:
+        for name in ("shadow_map", "planar", "projective"):
+            renderer.use("shadow", FAMILIES["shadow"].make(name, changes={"map_size": 64} if name[0] == "p" else None))
+            renderer.draw()
     for depth in (2, 3):
         trace(scene, (8, 6), TruthSettings(target=1, depth=depth), gpu=gpu, cache=False)
     with World(gpu, scene, movable=True) as world:
@@ -131,6 +142,8 @@ def test_every_module_is_imported_or_has_an_entry_point(gpu: Gpu) -> None:
     roots = {module for module, _ in entry_points(gpu)}
     overlaid = {cls.shader() for family in ("shadow", "occlusion") for cls in FAMILIES[family].members.values()}
     overlaid |= set(IN_WORDS.values())
+    # Functions of shapes, which a field's bindings import by name, are beside what they are described by.
+    overlaid |= {f"package::sdf::{path.stem}" for path in Path(tyndall.sdf.__file__).parent.glob("*.py")}
     for module in texts.keys() - roots - overlaid:
         users = [m for m, text in texts.items() if re.search(rf"import {module}\b", text)]
         assert users, f"{module} is imported nowhere"

@@ -207,7 +207,14 @@ class Renderer(Closing):
             self._resolved = self._images["lit"]
         owner = f"{family}.{made.name}"
         self._views[family] = View(
-            self.gpu, self.scene, self.size, owner, made, self._images, make_world=lambda: self.world
+            self.gpu,
+            self.scene,
+            self.size,
+            owner,
+            made,
+            self._images,
+            make_world=lambda: self.world,
+            fields=self._fields.field if self._fields else None,
         )
         if self._world and not self._casts_rays():
             self._world.close()
@@ -221,7 +228,12 @@ class Renderer(Closing):
     def world(self) -> World:
         """The scene for rays; built when it is asked for first, freed by :meth:`use` once no technique casts any."""
         if self._world is None:
-            self._world = World(self.gpu, self.scene, meshes=self._meshes)
+            self._world = World(
+                self.gpu,
+                self.scene,
+                meshes=self._meshes,
+                fields=self._fields.field if self._fields else None,
+            )
         return self._world
 
     def technique(self, family: str) -> Any:
@@ -320,7 +332,6 @@ class Renderer(Closing):
     def _view(self, family: str, scope: dict[str, Any] | None = None, overlay: dict[str, str] | None = None) -> View:
         view = self._views[family]
         view.scope, view.overlay, view.frame = scope or self._scope, overlay or {}, self._frame
-        view.fields = self._fields.field if self._fields else None
         if self._camera_seen is not None:
             view.camera = self._camera_seen
         return view
@@ -475,6 +486,39 @@ class Renderer(Closing):
         gpu.forget_groups()
         with np.errstate(divide="ignore"):
             return np.float32(self._camera_seen.near if self._camera_seen else 1) / raw
+
+    def surface(self, name: str) -> NDArray[Any]:
+        """What the G-buffer holds of what each pixel shows, (height, width) or (height, width, 3).
+
+        Args:
+            name: "normals" (world, of unit length), "roughness", "albedo", "metallic" or "emissive", all float32 and 0
+                for the background; of implicit surfaces "ids", the object's number from 1 on and 0 for anything else,
+                and "steps", how many the march through the pixel took, both uint32.
+
+        Raises:
+            ParameterError: an unknown name.
+        """
+        images: dict[str, tuple[str, Any]] = {
+            "normals": ("normal_roughness", slice(0, 3)),
+            "roughness": ("normal_roughness", 3),
+            "albedo": ("albedo_metallic", slice(0, 3)),
+            "metallic": ("albedo_metallic", 3),
+            "emissive": ("emissive", slice(0, 3)),
+        }
+        if name in ("ids", "steps"):
+            if self._fields is None:
+                return np.zeros(self.size[::-1], np.uint32)
+            return self._fields.found()[name]
+        if name not in images:
+            raise ParameterError(f"surface: no '{name}'{nearest(name, [*images, 'ids', 'steps'])}")
+        image, channels = images[name]
+        if name == "emissive" and name not in self._targets:
+            return np.zeros((*self.size[::-1], 3), np.float32)
+        texels = self.gpu.read_texture(self._images[image]).astype(np.float32)
+        if image == "albedo_metallic":
+            texels /= 255
+            texels[..., :3] **= 2  # as albedo.wesl has it
+        return np.ascontiguousarray(texels[..., channels])
 
     def timings(self) -> dict[str, float]:
         """GPU milliseconds of the last frame by pass name, and "frame" for the whole; waits for it.

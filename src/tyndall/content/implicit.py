@@ -18,6 +18,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from tyndall.content.contract import PLANE_FORMAT, SHADE_TARGET, Casters, Cull, Prepared
 from tyndall.content.mesh import MAP_FORMAT
 from tyndall.content.outline import Outline
@@ -30,6 +33,7 @@ from tyndall.sdf.shape import Named, Painted, Shape
 
 MODULE = "package::content::implicit"
 OWNER = "implicit"
+_ID_BITS = 20  # as in implicit.wesl
 
 
 class Fields:
@@ -141,6 +145,11 @@ class Fields:
                 "field.shade", (*size, layers), "r32uint", owner=OWNER, dimension="2d-array"
             )
         return self._shade
+
+    def found(self) -> dict[str, NDArray[np.uint32]]:
+        """ "ids" and "steps" of the last march, (height, width) each: the object's number from 1 on, 0 for none."""
+        raw = self._gpu.read_texture(self._images["ids"])[..., 0]
+        return {"ids": raw & np.uint32((1 << _ID_BITS) - 1), "steps": raw >> np.uint32(_ID_BITS)}
 
     # --- what polygons have ---------------------------------------------------------------------------------------
 

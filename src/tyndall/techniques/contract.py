@@ -75,7 +75,7 @@ class View:
         size: width and height of the picture in pixels.
         frame: frames drawn before this one.
         make_world: gives :attr:`world`.
-        fields: the scene's implicit surfaces on the device; None where it has none.
+        fields: the scene's implicit surfaces on the device, up to date; None where it has none.
         owner: "family.name": owner in the ledger and prefix of its passes.
         maps_wanted: whether the volumetric technique reads shadow maps; what a shadow technique need not draw
             otherwise.
@@ -199,10 +199,9 @@ class View:
                 make_world=self.make_world,
             )
             self._parts[label] = made
-        made.scene = self.scene
+        made.scene, made.fields = self.scene, self.fields
         made.images, made.scope, made.overlay, made.frame = self.images, self.scope, self.overlay, self.frame
         made.camera, made.maps_wanted, made.air_wanted = self.camera, self.maps_wanted, self.air_wanted
-        made.fields = self.fields
         return made
 
     def forget(self) -> None:
