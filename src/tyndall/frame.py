@@ -75,8 +75,8 @@ class Renderer(Closing):
         size: width and height in pixels.
         gpu: the device to draw on; the renderer makes its own, and closes it, when none is given.
         adapter: part of an adapter's name, for a device of its own.
-        volumetric, shadow, occlusion, antialiasing, tonemap: techniques, by name or as instances; by name they start
-            from the scene's ``looks``.
+        volumetric, shadow, occlusion, reflection, antialiasing, tonemap: techniques, by name or as instances; by name
+            they start from the scene's ``looks``.
         seed: of everything random.
 
     Raises:
@@ -96,6 +96,7 @@ class Renderer(Closing):
         volumetric: str | Technique | None = None,
         shadow: str | Technique | None = None,
         occlusion: str | Technique | None = None,
+        reflection: str | Technique | None = None,
         antialiasing: str | Technique | None = None,
         tonemap: str | Technique | None = None,
         seed: int = 0,
@@ -111,6 +112,7 @@ class Renderer(Closing):
             "volumetric": volumetric,
             "shadow": shadow,
             "occlusion": occlusion,
+            "reflection": reflection,
             "antialiasing": antialiasing,
             "tonemap": tonemap,
         }
@@ -161,7 +163,7 @@ class Renderer(Closing):
             image = gpu.texture(f"frame.{name}", size, format or gpu.depth_format, owner=OWNER, usage=usage)
             self._images[name] = image
             self._resources.append(image)
-        self._resolved = self._images["lit"]
+        self._resolved, self._base = self._images["lit"], self._images["base"]
         self._camera = self._buffer("camera", gpu.dtype(_CAMERA).itemsize, _CAMERA, "uniform")
         self._medium = self._buffer("medium", gpu.dtype(_MEDIUM).itemsize, _MEDIUM, "uniform")
         count = max(1, len(self.scene.lights))
@@ -204,7 +206,7 @@ class Renderer(Closing):
                     content.forget_bundles()
             self.gpu.forget_groups()
             self._history = 0
-            self._resolved = self._images["lit"]
+            self._resolved, self._base = self._images["lit"], self._images["base"]
         owner = f"{family}.{made.name}"
         self._views[family] = View(
             self.gpu,
@@ -315,6 +317,12 @@ class Renderer(Closing):
         gpu.compute("lighting", _MODULE, "lighting").bind(scope, lit_out=images["base"].write()).overlay(
             overlay
         ).dispatch(*self.size)
+
+        base = images["base"]
+        if self._fields:
+            mirror = self._view("reflection", scope, overlay)
+            base = self.technique("reflection").render(mirror, base, self._fields.bindings)
+        self._base, scope = base, {**scope, "base": base.sampled()}
 
         air = self._view("volumetric", scope, overlay)
         air.images = {**images, **({"shadow_maps": visibility.maps} if visibility.maps else {})}
@@ -464,7 +472,7 @@ class Renderer(Closing):
 
     def base(self) -> NDArray[np.float32]:
         """(height, width, 3) float32: ``L_b``, the surfaces' light before the air."""
-        return np.ascontiguousarray(self.gpu.read_texture(self._images["base"])[..., :3].astype(np.float32))
+        return np.ascontiguousarray(self.gpu.read_texture(self._base)[..., :3].astype(np.float32))
 
     def inscattered(self) -> NDArray[np.float32]:
         """(height, width, 3) float32: ``L_v``, the light that the air scatters towards the camera."""

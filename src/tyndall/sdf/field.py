@@ -194,6 +194,7 @@ class Field(Closing):
         for row, m in zip(rows, listed, strict=False):
             row["base_color"], row["emissive"] = m.base_color[:3], m.emissive
             row["metallic"], row["roughness"] = m.metallic, m.roughness
+            row["clear"] = m.reflections, m.transmission, m.ior, m.attenuation_distance
         return rows
 
     def _bind(self) -> dict[str, Any]:
