@@ -15,6 +15,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from tyndall import sdf
     from tyndall.frame import Renderer
     from tyndall.gpu.device import GpuError
     from tyndall.gpu.params import ParameterError
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
         Gibbons,
         HenyeyGreenstein,
         Image,
+        Implicit,
         Instance,
         Isotropic,
         Material,
@@ -83,6 +85,7 @@ __all__ = [
     "GpuError",
     "HenyeyGreenstein",
     "Image",
+    "Implicit",
     "Instance",
     "Isotropic",
     "March",
@@ -126,6 +129,7 @@ __all__ = [
     "render",
     "save",
     "scenes",
+    "sdf",
     "stage",
     "sweep",
     "trace",
@@ -158,6 +162,8 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module 'tyndall' has no attribute '{name}'")
     if name == "scenes":
         value: Any = importlib.import_module("tyndall.scene.bundled")
+    elif name == "sdf":
+        value = importlib.import_module("tyndall.sdf")
     else:
         modules = (importlib.import_module(home) for home in _HOMES)
         value = next(vars(module)[name] for module in modules if name in vars(module))

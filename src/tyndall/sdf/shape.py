@@ -2,8 +2,8 @@
 
 >>> from tyndall.sdf import box, cylinder, sphere, X
 >>> part = sphere(1) & box(1.5) - cylinder(0.5).orient(X)
->>> part([[0, 0, 0], [2, 0, 0]]).round(3)
-array([0.5, 1.25])
+>>> part([[0, 0, 0], [2, 0, 0]])
+array([0.5 , 1.25])
 
 A shape is a tree of nodes of seven kinds, each a frozen dataclass:
 
@@ -172,15 +172,80 @@ class Shape:
             m, shape = m @ self.placement, self.shape
         return Transformed(shape, tuple(tuple(float(x) for x in row) for row in m))
 
-    # --- describing ---
+    # --- one dimension more ---
 
-    def material(self, material: Material) -> Shape:
-        """With this material wherever a part has none of its own."""
-        return Painted(self, material)
+    def extrude(self, height: float) -> Shape:
+        """A flat shape made solid along Z, around its plane; see :class:`tyndall.sdf.modifiers.Extrude`."""
+        return _modified("Extrude", self, height)
 
-    def named(self, name: str) -> Shape:
-        """With a name, by which it can be moved once it is on the device. Several shapes may share a name."""
-        return Named(self, name)
+    def revolve(self, offset: float = 0.0) -> Shape:
+        """A flat shape turned about its own Y, moved away from it by ``offset``; what has x > 0 is used; see
+        :class:`tyndall.sdf.modifiers.Revolve`."""
+        return _modified("Revolve", self, offset)
+
+    # --- changing ---
+
+    def round(self, radius: float) -> Shape:
+        """The surface moved outwards, so that edges become round; see :class:`tyndall.sdf.modifiers.Round`."""
+        return _modified("Round", self, radius)
+
+    def shell(self, thickness: float) -> Shape:
+        """Only a sheet along the surface, half of it to each side; see :class:`tyndall.sdf.modifiers.Shell`."""
+        return _modified("Shell", self, thickness)
+
+    def elongate(self, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Shape:
+        """Cut at 0 and pulled apart by these lengths; see :class:`tyndall.sdf.modifiers.Elongate`."""
+        return _modified("Elongate", self, (x, y, z))
+
+    def displace(self, amplitude: float, wavelength: float) -> Shape:
+        """With regular bumps; see :class:`tyndall.sdf.modifiers.Displace`."""
+        return _modified("Displace", self, amplitude, wavelength)
+
+    def noise(self, amplitude: float, step: float, seed: int = 0, octaves: int = 1) -> Shape:
+        """With irregular bumps; see :class:`tyndall.sdf.modifiers.Noise`."""
+        return _modified("Noise", self, amplitude, step, seed, octaves)
+
+    def twist(self, rate: float) -> Shape:
+        """Turned about Z by ``rate`` radians per metre of z; see :class:`tyndall.sdf.modifiers.Twist`."""
+        return _modified("Twist", self, rate)
+
+    def bend(self, rate: float) -> Shape:
+        """Turned about Z by ``rate`` radians per metre of x; see :class:`tyndall.sdf.modifiers.Bend`."""
+        return _modified("Bend", self, rate)
+
+    def mirror(self, axes: str = "x") -> Shape:
+        """What is on the positive side of the named axes, on both; see :class:`tyndall.sdf.modifiers.Mirror`."""
+        return _modified("mirror", self, axes)
+
+    # --- many times ---
+
+    def repeat(
+        self,
+        spacing: float | Sequence[float],
+        count: int | Sequence[int] | None = None,
+        *,
+        mirrored: bool = False,
+    ) -> Shape:
+        """Copies along X, Y and Z, around 0.
+
+        Args:
+            spacing: between copies, one or three; 0 on an axis that has none.
+            count: copies on each axis, one or three; None: without end.
+            mirrored: every second one is a mirror image; without end only.
+
+        Returns:
+            A :class:`tyndall.sdf.repetition.Repeated`, ``RepeatedForever`` or ``MirroredForever``.
+        """
+        from tyndall.sdf import repetition
+
+        return repetition.repeat(self, spacing, count, mirrored)
+
+    def polar(self, count: int, axis: Sequence[float] = Z) -> Shape:
+        """``count`` copies turned about an axis through 0; see :class:`tyndall.sdf.repetition.Polar`."""
+        from tyndall.sdf import repetition
+
+        x, y, z = axis
+        return repetition.Polar(self, count, (x, y, z))
 
     def moved(self, moves: Mapping[str, Iterator[Floats]]) -> Shape:
         """The same with its named parts moved from where they stand, in the space that holds them.
@@ -240,6 +305,24 @@ class Shape:
 
         return slices.show_gradient(self, x=x, y=y, z=z, size=size, pixels=pixels)
 
+    # --- describing ---
+
+    def material(self, material: Material) -> Shape:
+        """With this material wherever a part has none of its own."""
+        return Painted(self, material)
+
+    def named(self, name: str) -> Shape:
+        """With a name, by which it can be moved once it is on the device. Several shapes may share a name."""
+        return Named(self, name)
+
+
+def _modified(kind: str, *arguments: Any) -> Shape:
+    """A node of a module that imports this one."""
+    from tyndall.sdf import modifiers
+
+    shape: Shape = getattr(modifiers, kind)(*arguments)
+    return shape
+
 
 def rotation(angle: float, axis: Sequence[float]) -> Floats:
     """4×4: a right-handed turn by ``angle`` radians about ``axis`` (Rodrigues 1840)."""
@@ -254,6 +337,26 @@ def rotation(angle: float, axis: Sequence[float]) -> Floats:
     return matrix
 
 
+def of_shape(shape: Any) -> int:
+    """The dimension of what must be a shape.
+
+    Raises:
+        ParameterError: it is something else.
+    """
+    if not isinstance(shape, Shape):
+        raise ParameterError(f"shape: {shape!r} is no shape")
+    return shape.dimension
+
+
+def _numbers(node: Shape) -> tuple[float, ...]:
+    """The declared parameters of a node in order, tuples flat."""
+    flat: list[float] = []
+    for f in fields_of(type(node)):
+        value = getattr(node, f.name)
+        flat.extend(float(v) for v in (value if isinstance(value, tuple) else (value,)))
+    return tuple(flat)
+
+
 # --- kinds of nodes -----------------------------------------------------------------------------------------------
 
 
@@ -266,7 +369,7 @@ class Primitive(Shape):
 
     Attributes:
         code: the name of that function.
-        module: the WESL module it is in; ``package::sdf::profiles`` for most flat shapes.
+        module: the WESL module that it is in.
     """
 
     code: ClassVar[str]
@@ -276,19 +379,24 @@ class Primitive(Shape):
     def payload(self) -> NDArray[np.float32] | None:
         """More numbers than 8, (N,), which the function reads from ``implicit_slots`` by fours.
 
-        Where there are any, ``bitcast<u32>(a.x)`` is the index of their first slot on the device, whatever the first
-        of :attr:`numbers` is.
+        Where there are any, ``a.x`` is the index of their first slot on the device, whatever the first of
+        :attr:`numbers` is. The same array of several shapes is there once.
         """
         return None
 
     @property
     def numbers(self) -> tuple[float, ...]:
         """What the WESL function gets, at most 8; the declared parameters in order unless told otherwise."""
-        flat: list[float] = []
-        for f in fields_of(type(self)):
-            value = getattr(self, f.name)
-            flat.extend(value if isinstance(value, tuple) else [value])
-        return tuple(flat)
+        return _numbers(self)
+
+    @property
+    def corners(self) -> Box:
+        """The least box of what is inside, where the values are distances; others override :meth:`extent`."""
+        raise NotImplementedError
+
+    def extent(self, level: float) -> Box:
+        low, high = self.corners
+        return low - level, high + level
 
     @cached_property
     def lipschitz(self) -> float:
@@ -309,14 +417,34 @@ class Modifier(Shape):
 
     Attributes:
         code: the name of these functions.
+        module: the WESL module that they are in.
         warps, adjusts: which of them it has.
-        stretch: how much faster places change inside than outside: a Lipschitz bound of *enter* where the child is.
+        placed: whether *leave* looks at the place.
+        takes, gives: the dimension of the child that it must have, and what it makes of it; None: as the child's.
+        continuous: whether nearby places enter near each other. Where they do not, the bound holds for the union that
+            the node is part of (:class:`tyndall.sdf.repetition.RepeatedForever`) and for no part of it.
+        stretch: how much faster places change inside than outside: a Lipschitz bound of *enter*.
     """
 
     code: ClassVar[str]
+    module: ClassVar[str] = "package::sdf::modifiers"
     warps: ClassVar[bool] = False
     adjusts: ClassVar[bool] = False
+    placed: ClassVar[bool] = True
+    takes: ClassVar[int | None] = None
+    gives: ClassVar[int | None] = None
+    continuous: ClassVar[bool] = True
     shape: Shape
+
+    def __post_init__(self) -> None:
+        check(self)
+        given = of_shape(self.shape)
+        if self.takes not in (None, given):
+            raise ParameterError(
+                f"{self.code}: {type(self.shape).__name__} is {'solid' if given == 3 else 'flat'}; "
+                f"this is for {'solid' if self.takes == 3 else 'flat'} shapes"
+            )
+        object.__setattr__(self, "dimension", self.gives or given)
 
     @property
     def children(self) -> tuple[Shape, ...]:
@@ -325,11 +453,7 @@ class Modifier(Shape):
     @property
     def numbers(self) -> tuple[float, ...]:
         """What the WESL functions get, at most 8."""
-        flat: list[float] = []
-        for f in fields_of(type(self)):
-            value = getattr(self, f.name)
-            flat.extend(value if isinstance(value, tuple) else [value])
-        return tuple(flat)
+        return _numbers(self)
 
     def enter(self, p: Floats) -> Floats:
         """(N, 3) places that the child is asked at."""
@@ -479,9 +603,11 @@ class Transformed(Shape):
 
     def __post_init__(self) -> None:
         m = self.placement
-        if not np.isfinite(m).all() or np.linalg.svd(m[:3, :3], compute_uv=False)[-1] <= 1e-12:
+        if m.shape != (4, 4) or not np.isfinite(m).all() or np.linalg.svd(m[:3, :3], compute_uv=False)[-1] <= 1e-12:
             raise ParameterError("matrix: not finite numbers that have an inverse")
-        object.__setattr__(self, "dimension", self.shape.dimension)
+        object.__setattr__(self, "dimension", of_shape(self.shape))
+        if self.dimension == 2 and (m[2, :2].any() or m[:2, 2].any()):
+            raise ParameterError("matrix: it turns a flat shape out of its plane; extrude or revolve it first")
 
     @property
     def placement(self) -> Floats:
@@ -513,7 +639,8 @@ class Transformed(Shape):
 
     @cached_property
     def accuracy(self) -> Accuracy:
-        singular = np.linalg.svd(self.placement[:3, :3], compute_uv=False)
+        size = self.dimension
+        singular = np.linalg.svd(self.placement[:size, :size], compute_uv=False)
         return self.shape.accuracy if singular[0] <= singular[-1] * (1 + 1e-9) else "bound"
 
 
@@ -535,7 +662,7 @@ class Painted(Shape):
     surface: Material
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "dimension", self.shape.dimension)
+        object.__setattr__(self, "dimension", of_shape(self.shape))
 
     @property
     def children(self) -> tuple[Shape, ...]:
@@ -564,7 +691,7 @@ class Named(Shape):
     name: str
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "dimension", self.shape.dimension)
+        object.__setattr__(self, "dimension", of_shape(self.shape))
 
     @property
     def children(self) -> tuple[Shape, ...]:
