@@ -49,7 +49,7 @@ def test_a_plane_is_open(gpu: Gpu, scale: float) -> None:
         far = Implicit(sphere(0.5 * scale).at(0, 60 * scale, 0))
         own = Implicit(box(tuple(scale * x for x in (40, 2, 40))).at(0, -scale, 0), material=WHITE)
         for shapes, implicits in (([props.floor(0, 20 * scale)], (far,)), ([props.floor(0, 20 * scale)], (own,))):
-            scene = Scene(shapes, camera=camera, ambient=AMBIENT, implicits=implicits)
+            scene = Scene(shapes, camera=camera, ambient=AMBIENT, implicits=props.fields(*implicits))
             got = opening(gpu, scene, FieldAo(radius=scale))
             below = props.rays(camera, SIZE).directions[..., 1] < -0.05
             np.testing.assert_allclose(got[below], 1, atol=2e-3)
@@ -60,7 +60,7 @@ def test_a_plane_is_open(gpu: Gpu, scale: float) -> None:
 def test_a_corner_is_as_open_as_the_closed_form(gpu: Gpu, thickness: float, turn: float) -> None:
     camera = Camera((1.2, 1.6, 0), (1.0, 0, 0), fov=0.9, near=0.02)
     wall = Implicit(box((thickness, 20, 40)).at(-0.5 * thickness, 0, 0).rotate(turn, (0, 1, 0)), material=WHITE)
-    scene = Scene([props.floor(0, 20)], camera=camera, ambient=AMBIENT, implicits=[wall])
+    scene = Scene([props.floor(0, 20)], camera=camera, ambient=AMBIENT, implicits=props.fields(wall))
     got = opening(gpu, scene, FieldAo(radius=1.0))
     seen = props.rays(camera, SIZE)
     points = seen.at(-seen.origin[1] / seen.directions[..., 1])
@@ -77,7 +77,7 @@ def test_a_deep_corner_is_a_quarter_open(gpu: Gpu) -> None:
     """Where a floor and two walls meet, all within the radius."""
     camera = Camera((1.2, 1.2, 1.2), (0.01, 0, 0.01), fov=0.05, near=0.02)
     walls = [Implicit(box((2, 40, 40)).at(-1, 0, 0)), Implicit(box((40, 40, 2)).at(0, 0, -1))]
-    scene = Scene([props.floor(0, 20)], camera=camera, ambient=AMBIENT, implicits=walls)
+    scene = Scene([props.floor(0, 20)], camera=camera, ambient=AMBIENT, implicits=props.fields(*walls))
     got = opening(gpu, scene, FieldAo(radius=20.0))
     seen = props.rays(camera, SIZE)
     points = seen.at(-seen.origin[1] / seen.directions[..., 1])
@@ -91,7 +91,7 @@ def test_a_ball_over_a_floor_hides_its_form_factor(gpu: Gpu) -> None:
     camera = Camera((0.4, 0.2, 2.0), (0, 0, 0), fov=0.1, near=0.02)
     for height in (1.2, 1.5):
         ball = Implicit(sphere(1).at(0, height, 0))
-        scene = Scene([props.floor(0, 20)], camera=camera, ambient=AMBIENT, implicits=[ball])
+        scene = Scene([props.floor(0, 20)], camera=camera, ambient=AMBIENT, implicits=props.fields(ball))
         got = opening(gpu, scene, FieldAo(radius=10.0))[16:20, 22:26].mean()
         assert got == pytest.approx(1 - 1 / height**2, abs=0.15)
 
@@ -99,7 +99,7 @@ def test_a_ball_over_a_floor_hides_its_form_factor(gpu: Gpu) -> None:
 def test_only_the_ambient_light_is_dimmed(gpu: Gpu) -> None:
     camera = Camera((0.9, 1.1, 1.6), (0.2, 0, 0), fov=0.8, near=0.02)
     wall = Implicit(box((2, 4, 40)).at(-1.4, 0, 0))
-    lit = Scene([props.floor(0, 20)], [DirectionalLight((-0.3, -1, -0.2), 2.0)], camera, implicits=[wall])
+    lit = Scene([props.floor(0, 20)], [DirectionalLight((-0.3, -1, -0.2), 2.0)], camera, implicits=props.fields(wall))
     assert np.array_equal(draw(gpu, lit, FieldAo()), draw(gpu, lit, NoOcclusion()))
     both = lit.with_(ambient=AMBIENT)
     dark, full = draw(gpu, both, FieldAo()), draw(gpu, both, NoOcclusion())

@@ -27,7 +27,8 @@ from tyndall.techniques.volumetric.march import March
 
 SIZE = (96, 72)
 ABOVE = Camera((2.5, 4, 4.5), (0, 0.3, 0), fov=0.8, near=0.05)
-BOX = Implicit(box(1).at(0, 0.9, 0))
+BEHIND = (0, 0, -3.5)
+FIELD = props.fields(Implicit(box(1).at(0, 0.9, 0)))
 AS_MESH = props.box((-0.5, 0.4, -0.5), (0.5, 1.4, 0.5))
 
 
@@ -60,7 +61,7 @@ LIGHTS: list[Any] = [
 
 @pytest.mark.parametrize("light", LIGHTS)
 def test_hard_shadows_are_the_rays_answers(gpu: Gpu, light: Light) -> None:
-    scene = Scene([props.floor(0, 4)], [light], ABOVE, implicits=[BOX])
+    scene = Scene([props.floor(0, 4)], [light], ABOVE, implicits=FIELD)
     got = received(gpu, scene)
     meshes = Scene([AS_MESH], [light])
     points = floor_points(ABOVE)
@@ -82,7 +83,9 @@ def test_a_straight_edge_leaves_its_part_of_the_light(gpu: Gpu, height: float, t
     camera = Camera((0, 0, 0.9 * height - 3), (0, 0, -3), fov=0.4, near=0.02)
     light = DirectionalLight((0, 0, -1), 1.0, angular_diameter=0.2)
     sheet = box((8, 16, thickness)).at(-4, 0, height - 3 + 0.5 * thickness).rotate(turn)
-    got = received(gpu, Scene([props.wall(-3, 4)], [light], camera, implicits=[Implicit(sheet)]))
+    got = received(
+        gpu, Scene([props.wall(-3, 4)], [light], camera, implicits=props.fields(Implicit(sheet), specks=BEHIND))
+    )
     seen = props.rays(camera, SIZE)
     points = seen.at((-3 - seen.origin[2]) / seen.directions[..., 2])
     across = points[..., 0] * math.cos(turn) + points[..., 1] * math.sin(turn)
@@ -139,7 +142,7 @@ def seen_parts(light: Light, points: np.ndarray, count: int = 128) -> np.ndarray
 @pytest.mark.parametrize("light", BIG)
 def test_soft_shadows_of_all_kinds_of_light_are_near_the_truth(gpu: Gpu, light: Light) -> None:
     """And nearer than percentage-closer soft shadows of the same box as a mesh."""
-    got = received(gpu, Scene([props.floor(0, 4)], [light], ABOVE, implicits=[BOX]))[::2, ::2]
+    got = received(gpu, Scene([props.floor(0, 4)], [light], ABOVE, implicits=FIELD))[::2, ::2]
     pcss = props.shade(gpu, Scene([props.floor(0, 4), AS_MESH], [light], ABOVE), "pcss", SIZE)[::2, ::2]
     points = floor_points(ABOVE)[::2, ::2]
     sure = (np.abs(points[..., [0, 2]]).max(-1) < 3.5) & on_floor()[::2, ::2]
@@ -155,7 +158,7 @@ def test_what_is_smaller_than_the_light_hides_its_part_of_it(gpu: Gpu) -> None:
     camera = Camera((0, 0, -1.3), (0, 0, -3), fov=0.5, near=0.02)
     for radius in (0.1, 0.2):
         ball = Implicit(sphere(radius).at(0, 0, -1))
-        got = received(gpu, Scene([props.wall(-3, 4)], [light], camera, implicits=[ball]))
+        got = received(gpu, Scene([props.wall(-3, 4)], [light], camera, implicits=props.fields(ball, specks=BEHIND)))
         want = 1 - (radius / (2 * math.tan(0.2))) ** 2
         assert got[34:38, 46:50].mean() == pytest.approx(want, abs=0.08)
         assert got.min() > want - 0.12
@@ -165,8 +168,8 @@ def test_meshes_cast_beside_the_field(gpu: Gpu) -> None:
     """A scene of both is darkened by both; what a mesh hides is as dark as the map says."""
     light = DirectionalLight((0.5, -1.0, -0.35), 3.0)
     block = props.box((1.0, 0.2, 0.6), (1.6, 0.8, 1.2))
-    both = received(gpu, Scene([props.floor(0, 4), block], [light], ABOVE, implicits=[BOX]))
-    field = received(gpu, Scene([props.floor(0, 4)], [light], ABOVE, implicits=[BOX]))
+    both = received(gpu, Scene([props.floor(0, 4), block], [light], ABOVE, implicits=FIELD))
+    field = received(gpu, Scene([props.floor(0, 4)], [light], ABOVE, implicits=FIELD))
     mesh = props.shade(gpu, Scene([props.floor(0, 4), block], [light], ABOVE), "shadow_map", SIZE)
     seen = props.rays(ABOVE, SIZE)
     floor = np.isinf(props.cast(Scene([block]), seen.origin, seen.directions).distance)
@@ -180,9 +183,9 @@ def test_the_terminator_fades_over_the_whole_light(gpu: Gpu) -> None:
     """A floor whose horizon cuts the light gets the part above it: the irradiance of rays, and no shade of its own."""
     for elevation in (0.3, 0.1, 0.02, -0.05):
         light = DirectionalLight((math.cos(elevation), -math.sin(elevation), 0), 3.0, angular_diameter=0.3)
-        far = Implicit(sphere(0.1).at(0, 50, 0))
         base = []
-        for shadow, implicits in (("ray_traced", ()), (FieldShadows(), (far,))):
+        far = props.fields(Implicit(sphere(0.1).at(0, 50, 0)))
+        for shadow, implicits in (("ray_traced", ()), (FieldShadows(), far)):
             scene = Scene([props.floor(0, 40)], [light], ABOVE, implicits=implicits)
             base.append(props.shoot(gpu, scene, (32, 24), shadow=shadow).base[..., 0])
         np.testing.assert_allclose(base[1], base[0], rtol=0.02, atol=1e-3)
@@ -194,7 +197,7 @@ def test_the_air_is_asked_too(gpu: Gpu) -> None:
     air = Medium(0.05)
     march = March(steps=32)
     of_mesh = Scene([props.floor(0, 4), AS_MESH], [light], ABOVE, air)
-    of_field = Scene([props.floor(0, 4)], [light], ABOVE, air, implicits=[BOX])
+    of_field = Scene([props.floor(0, 4)], [light], ABOVE, air, implicits=FIELD)
     want = props.shoot(gpu, of_mesh, (48, 36), shadow="ray_traced", volumetric=march).inscattered
     got = props.shoot(gpu, of_field, (48, 36), shadow=FieldShadows(), volumetric=march).inscattered
     lit = props.shoot(gpu, of_mesh.with_(instances=of_mesh.instances[:1]), (48, 36), volumetric=march).inscattered
