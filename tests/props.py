@@ -134,9 +134,10 @@ def slits(z: float, half: float, width: float, count: int, material: Material = 
     ]
 
 
-def fields(*implicits: Implicit, specks: Vec3 = (0, -0.5, 0)) -> tuple[Implicit, ...]:
+def fields(*implicits: Implicit, specks: Vec3 = (0, -0.5, 0), material: Material = Material()) -> tuple[Implicit, ...]:
     """Implicit surfaces with specks that nobody sees: four in all, of balls and boxes, so that scenes share shaders."""
-    extra = [Implicit(shape.at(*specks)) for shape in (sphere(1e-6), box_shape(1e-6), sphere(1e-6), sphere(1e-6))]
+    shapes = (sphere(1e-6), box_shape(1e-6), sphere(1e-6), sphere(1e-6))
+    extra = [Implicit(shape.at(*specks), material=material) for shape in shapes]
     return (*extra[: 4 - len(implicits)], *implicits)
 
 

@@ -1,19 +1,20 @@
 """Reflection and refraction by rays through the field of implicit surfaces (Whitted 1980).
 
 Where a material has ``reflections`` or ``transmission``, the pixel's light is gathered anew, along a tree of rays that
-splits at each polished or clear surface: a part ``F`` of the light comes from the mirrored direction, of the rest a part
-``transmission`` from the refracted one, and what is left is the surface's own matte light::
+splits at each polished or clear surface: a part ``F`` of the light comes from the mirrored direction, of the rest a
+part ``transmission`` from the refracted one, and what is left is the surface's own matte light::
 
     L = F·L_mirrored + (1 − F)·(transmission·L_refracted + (1 − transmission)·L_matte) + L_lights'_highlights
 
 F is Fresnel's of a dielectric with the material's ``ior`` (0.04 at normal incidence for 1.5, and 1 beyond the angle of
-total reflection), of a metal Schlick's with its colour. A white surface in even light stays as bright as it is: what is
-mirrored and refracted takes the place of the ambient light, in the same measure. Inside, a ray is marched through the
-negative field and dimmed by Beer's law, so that after ``attenuation_distance`` the base colour is left of white light.
+total reflection), of a metal Schlick's with its colour. A white surface in even light stays as bright as it is: what
+is mirrored and refracted takes the place of the ambient light, in the same measure. Inside, a ray is marched through
+the negative field and dimmed by Beer's law, so that after ``attenuation_distance`` the base colour is left of white
+light.
 
-What a ray meets is lit by the scene's lights, with the visibility of the shadow technique, by the ambient light, and by
-what it emits; a ray that meets nothing brings the background. Rays end after ``bounces`` surfaces with the background's
-light, or where less than 1/500 of it would arrive.
+What a ray meets is lit by the scene's lights, with the visibility of the shadow technique, by the ambient light, and
+by what it emits; a ray that meets nothing brings the background. Rays end after ``bounces`` surfaces with the
+background's light, or where less than 1/500 of it would arrive.
 
 Limits. Reflections are sharp, whatever the roughness: they are meant for what is polished. Rays see implicit surfaces
 only, not meshes nor air; meshes reflect nothing. Clear things cast shadows as opaque ones do. A clear thing inside

@@ -17,10 +17,14 @@ from tyndall.techniques.reflection.field_reflections import FieldReflections
 from tyndall.techniques.reflection.none import NoReflections
 
 SIZE = (64, 48)
-AWAY = (0, 0, 60)
 MIRROR = Material("mirror", (1, 1, 1, 1), metallic=1.0, roughness=0.1, reflections=True)
 GLASS = Material("glass", (1, 1, 1, 1), roughness=0.1, transmission=1.0, ior=1.5)
 RED = Material("lamp", (0, 0, 0, 1), roughness=1.0, emissive=(2.0, 0, 0))
+
+
+def fields(*implicits: Implicit) -> tuple[Implicit, ...]:
+    """With specks behind the camera that glow, so that all scenes here share their shaders."""
+    return props.fields(*implicits, specks=(0, 0, 60), material=RED)
 
 
 def draw(gpu: Gpu, scene: Scene, technique: Any = None, size: tuple[int, int] = SIZE, **others: Any) -> np.ndarray:
@@ -42,7 +46,7 @@ def test_a_mirror_shows_the_ball_where_its_image_is(gpu: Gpu) -> None:
     floor = Implicit(box((20, 1, 20)).at(0, -0.5, 0), material=MIRROR)
     lamp = Implicit(sphere(0.5).at(0.3, 1.0, -1), material=RED)
     camera = Camera((0, 1.2, 3), (0, 0.3, 0), fov=0.8, near=0.05)
-    got = draw(gpu, Scene(camera=camera, background=(0, 0, 0.5), implicits=props.fields(floor, lamp, specks=AWAY)))
+    got = draw(gpu, Scene(camera=camera, background=(0, 0, 0.5), implicits=fields(floor, lamp)))
     rays = props.rays(camera, SIZE)
     direct = meets((0.3, 1.0, -1), 0.5, rays.origin, rays.directions)
     image = meets((0.3, -1.0, -1), 0.5, rays.origin, rays.directions)
@@ -80,9 +84,7 @@ def test_a_glass_ball_shows_the_world_upside_down(gpu: Gpu) -> None:
     lamp_at = (0.6, 0.9, -4.0)
     scene = Scene(
         camera=camera,
-        implicits=props.fields(
-            Implicit(sphere(1.0), material=GLASS), Implicit(sphere(0.9).at(*lamp_at), material=RED), specks=AWAY
-        ),
+        implicits=fields(Implicit(sphere(1.0), material=GLASS), Implicit(sphere(0.9).at(*lamp_at), material=RED)),
     )
     got = draw(gpu, scene, FieldReflections(bounces=6))[..., 0]
     rays = props.rays(camera, SIZE)
@@ -110,9 +112,7 @@ def test_fresnel_at_normal_incidence_is_four_hundredths(gpu: Gpu) -> None:
         (Material(base_color=(0.9, 0.5, 0.2, 1), metallic=1.0, reflections=True), (0.9, 0.5, 0.2)),
     ):
         slab = Implicit(box((4, 4, 1)).at(0, 0, -0.5), material=material)
-        got = draw(
-            gpu, Scene(camera=camera, background=(1, 1, 1), implicits=props.fields(slab, specks=AWAY)), size=(8, 8)
-        )
+        got = draw(gpu, Scene(camera=camera, background=(1, 1, 1), implicits=fields(slab)), size=(8, 8))
         np.testing.assert_allclose(got, np.broadcast_to(want, got.shape), atol=2e-3)
 
 
@@ -134,9 +134,7 @@ def test_white_things_in_even_light_vanish(gpu: Gpu, material: Material) -> None
         Implicit(sphere(0.7).at(-0.6, 0, 0), material=material),
         Implicit(box(1).at(0.8, 0, 0), material=material),
     ]
-    got = draw(
-        gpu, Scene(camera=camera, background=(1, 1, 1), ambient=(1, 1, 1), implicits=props.fields(*things, specks=AWAY))
-    )
+    got = draw(gpu, Scene(camera=camera, background=(1, 1, 1), ambient=(1, 1, 1), implicits=fields(*things)))
     np.testing.assert_allclose(got, 1, atol=4e-3)
 
 
@@ -148,7 +146,7 @@ def test_beers_law_inside(gpu: Gpu) -> None:
         slab = Implicit(box((8, 8, thickness)), material=tinted)
         got = draw(
             gpu,
-            Scene(camera=camera, background=(1, 1, 1), implicits=props.fields(slab, specks=AWAY)),
+            Scene(camera=camera, background=(1, 1, 1), implicits=fields(slab)),
             FieldReflections(bounces=8),
             (8, 8),
         )
@@ -165,7 +163,7 @@ def test_beyond_the_angle_of_total_reflection_nothing_gets_out(gpu: Gpu) -> None
     below = Implicit(box((30, 0.2, 30)).at(0, -2.0, 0), material=RED)
     got = draw(
         gpu,
-        Scene(camera=camera, background=(0, 0, 1), implicits=props.fields(block, below, specks=AWAY)),
+        Scene(camera=camera, background=(0, 0, 1), implicits=fields(block, below)),
         FieldReflections(bounces=8),
     )
     # The ray enters at 1.8·sin(b) = sin(a); it comes to the lower face so flatly that it cannot leave there.
@@ -180,7 +178,7 @@ def test_what_is_mirrored_is_lit_and_shaded(gpu: Gpu) -> None:
     thing = Implicit(box((1, 1, 1)).at(0, 1.0, 0), material=white)
     light = DirectionalLight((0, 0, -1), 2.0)
     camera = Camera((0, 0.4, 4), (0, 0.4, 0), fov=0.7, near=0.05)
-    got = draw(gpu, Scene([], [light], camera, implicits=props.fields(floor, thing, specks=AWAY)), shadow="field")
+    got = draw(gpu, Scene([], [light], camera, implicits=fields(floor, thing)), shadow="field")
     rays = props.rays(camera, SIZE)
     face = rays.at((0.5 - 4) / rays.directions[..., 2])
     direct = (np.abs(face[..., 0]) < 0.4) & (np.abs(face[..., 1] - 1) < 0.4)
@@ -193,11 +191,12 @@ def test_what_is_mirrored_is_lit_and_shaded(gpu: Gpu) -> None:
 def test_matte_things_are_left_alone(gpu: Gpu) -> None:
     light = DirectionalLight((0.3, -1, -0.2), 2.0)
     camera = Camera((0, 0.5, 4), (0, 0, 0), fov=0.7, near=0.05)
-    matte = Scene([], [light], camera, implicits=props.fields(Implicit(sphere(1.0), material=props.WHITE), specks=AWAY))
+    matte = Scene([], [light], camera, implicits=fields(Implicit(sphere(1.0), material=props.WHITE)))
     assert np.array_equal(draw(gpu, matte), draw(gpu, matte, NoReflections()))
-    both = matte.with_(implicits=[*matte.implicits[1:], Implicit(sphere(0.3).at(1.4, 0, 0), material=MIRROR)])
+    ball = Implicit(sphere(0.3).at(1.4, 0, 0), material=MIRROR)
+    both = matte.with_(implicits=fields(matte.implicits[-1], ball))
     off = draw(gpu, both, NoReflections())
     on = draw(gpu, both)
-    ball = meets((0, 0, 0), 1.0, np.array(camera.position), props.rays(camera, SIZE).directions) < 0.9
-    assert np.array_equal(on[ball], off[ball])
+    inside = meets((0, 0, 0), 1.0, np.array(camera.position), props.rays(camera, SIZE).directions) < 0.9
+    assert np.array_equal(on[inside], off[inside])
     assert not np.array_equal(on, off)

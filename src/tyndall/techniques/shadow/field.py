@@ -65,7 +65,9 @@ class FieldShadows(Technique):
             return maps.render(view.part(maps), content)
         cast = maps.render(view.part(maps) if meshes else view.part(ShadowMap(size=16), "empty"), meshes)
         answers = mask_image(view)
-        told = view.keep("masks", answers, lambda: answers.sampled().declaring(FIELD_WITH_MESHES=bool(meshes)))
+        soft = [light.extent > 0 for light in view.scene.lights]
+        known = {"FIELD_WITH_MESHES": bool(meshes), "FIELD_HARD": not all(soft), "FIELD_SOFT": any(soft)}
+        told = view.keep("masks", (answers, bool(meshes)), lambda: answers.sampled().declaring(**known))
         bindings = {**view.fields.bindings, **cast.bindings, "field_params": view.params, "shadow_masks": told}
         march = view.compute("surfaces").bind(bindings, answers_out=answers.write()).overlay(cast.overlay)
         march.dispatch(*view.size, answers.size[2])
