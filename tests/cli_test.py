@@ -137,6 +137,22 @@ def test_render_writes_a_png_and_an_exr(capsys: pytest.CaptureFixture[str], fold
     assert sorted(p.name for p in (folder / "made/here").iterdir()) == ["froxel.exr", "froxel.png"]
 
 
+def test_a_view_is_drawn_in_place_of_the_picture(capsys: pytest.CaptureFixture[str], folder: Path) -> None:
+    document = run_json(capsys, "render", "box", "--size", "48x27", "--view", "normals", "--out", "made")
+    assert document["view"] == "normals"
+    pixels = pixels_of(folder / document["image"])
+    assert pixels.shape == (27, 48, 3)
+    assert sorted(p.name for p in (folder / "made").iterdir()) == ["normals.exr", "normals.png"]
+    for words, said in (
+        (("--view", "step"), "did you mean 'steps'"),
+        (("--view", "steps"), "box has none"),
+        (("--time", "1"), "nothing moves in box"),
+    ):
+        code, _, err = run(capsys, "render", "box", *words, "--out", "other")
+        assert (code, said in err) == (2, True), err
+    assert not (folder / "other").exists()
+
+
 def test_the_seed_and_the_parameters_reach_the_picture(capsys: pytest.CaptureFixture[str], folder: Path) -> None:
     def pixels(*words: str) -> np.ndarray[Any, Any]:
         document = run_json(capsys, "render", "box", "--size", "32x18", "--frames", "1", *words)

@@ -16,6 +16,7 @@ from tyndall.lab.truth import TruthSettings, trace
 from tyndall.scene.model import (
     DirectionalLight,
     Image,
+    Implicit,
     Instance,
     Material,
     Medium,
@@ -25,6 +26,7 @@ from tyndall.scene.model import (
     SpotLight,
     Texture,
 )
+from tyndall.sdf import box, sphere, union
 from tyndall.techniques import FAMILIES
 from tyndall.techniques.contract import Unsupported
 from tyndall.techniques.shadow.depth_maps import IN_WORDS
@@ -94,6 +96,12 @@ def test_every_entry_point_compiles_and_is_used(gpu: Gpu, monkeypatch: pytest.Mo
     solid = Scene(SHAPES[:2], LIGHTS[:1], props.AHEAD)  # maps of what has holes are not drawn in compute
     with Renderer(solid, (8, 6), gpu=gpu, shadow=ShadowMap(size=64, rasterizer="compute")) as renderer:
         renderer.draw()
+    surfaces = [Implicit(union(sphere(0.5), box(0.5), sphere(0.3), smooth=0.1), _mirror, Material(emissive=(1, 1, 1)))]
+    fields = Scene(SHAPES[:1], LIGHTS[:1], props.AHEAD, implicits=surfaces)
+    with Renderer(fields, (8, 6), gpu=gpu, shadow=ShadowMap(size=64)) as renderer:
+        for name in ("shadow_map", "planar", "projective"):
+            renderer.use("shadow", FAMILIES["shadow"].make(name, changes={"map_size": 64} if name[0] == "p" else None))
+            renderer.draw()
     for depth in (2, 3):
         trace(scene, (8, 6), TruthSettings(target=1, depth=depth), gpu=gpu, cache=False)
     with World(gpu, scene, movable=True) as world:

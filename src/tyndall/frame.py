@@ -13,16 +13,19 @@ from __future__ import annotations
 
 import itertools
 import math
-import time
 from collections import Counter, defaultdict
+from dataclasses import replace
+from time import perf_counter
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from tyndall.content.contract import Content
+from tyndall.content.implicit import Fields
 from tyndall.content.mesh import GBUFFER_TARGETS, Meshes
 from tyndall.gpu.device import Gpu, GpuError
-from tyndall.gpu.params import ParameterError
+from tyndall.gpu.params import ParameterError, nearest
 from tyndall.gpu.resources import Closing, Resource, Texture
 from tyndall.scene.model import (
     Camera,
@@ -34,6 +37,7 @@ from tyndall.scene.model import (
     Schlick,
     SpotLight,
     box_corners,
+    transforms,
 )
 from tyndall.techniques import FAMILIES, Technique
 from tyndall.techniques.contract import View
@@ -116,11 +120,15 @@ class Renderer(Closing):
         self._views: dict[str, View] = {}
         self._resources: list[Resource] = []
         self._images: dict[str, Texture] = {}
-        self._content: list[Meshes] = []
+        self._content: list[Content] = []
+        self._fields: Fields | None = None
         self._world: World | None = None
         self._frame = 0
         self._history = 0
         self._casters = True
+        self._time: float | None = None
+        self._moved = False
+        self._uploaded = self._sent = 0
         self._previous: NDArray[np.float64] | None = None
         self._camera_seen: Camera | None = None
         self._camera_row: Any = None
@@ -137,14 +145,18 @@ class Renderer(Closing):
         black = gpu.texture("frame.black", (1, 1), "rgba32float", owner=OWNER, usage="sampled")
         self._resources.append(black)
         gpu.write_texture(black, np.zeros((1, 1, 4), np.float32))
-        self._content = [Meshes(gpu, self.scene)]
+        self._meshes = Meshes(gpu, self.scene)
+        self._content = [self._meshes]
+        if self.scene.implicits:
+            self._fields = Fields(gpu, self.scene, size)
+            self._content.append(self._fields)
         self._targets = _TARGETS if any(content.emits for content in self._content) else _TARGETS[:2]
         for name, format in _IMAGES.items():
             if name in _TARGETS and name not in self._targets:
                 self._images[name] = black  # nothing shines by itself: a load outside of it is 0 as well
                 continue
             drawn = name in _TARGETS or name in ("depth", "inscatter")
-            stored = name not in (*_TARGETS, "depth")
+            stored = name != "depth" and (name not in _TARGETS or self._fields is not None)
             usage = " ".join(["sampled", *(["target"] if drawn else []), *(["storage"] if stored else [])])
             image = gpu.texture(f"frame.{name}", size, format or gpu.depth_format, owner=OWNER, usage=usage)
             self._images[name] = image
@@ -163,6 +175,8 @@ class Renderer(Closing):
             "inscatter_out": self._images["inscatter"].write(),
             "transmittance_out": self._images["transmittance_map"].write(),
         }
+        if self._fields:
+            self._scope |= {f"{name}_out": self._images[name].write() for name in self._targets}
         gpu.write(self._medium, pack_medium(self.scene.medium, gpu.dtype(_MEDIUM)))
         gpu.write(self._lights, pack_lights(self.scene, gpu.dtype(_LIGHT)))
         for family, technique in techniques.items():
@@ -193,7 +207,14 @@ class Renderer(Closing):
             self._resolved = self._images["lit"]
         owner = f"{family}.{made.name}"
         self._views[family] = View(
-            self.gpu, self.scene, self.size, owner, made, self._images, make_world=lambda: self.world
+            self.gpu,
+            self.scene,
+            self.size,
+            owner,
+            made,
+            self._images,
+            make_world=lambda: self.world,
+            fields=self._fields.field if self._fields else None,
         )
         if self._world and not self._casts_rays():
             self._world.close()
@@ -207,7 +228,7 @@ class Renderer(Closing):
     def world(self) -> World:
         """The scene for rays; built when it is asked for first, freed by :meth:`use` once no technique casts any."""
         if self._world is None:
-            self._world = World(self.gpu, self.scene, meshes=self._content[0])
+            self._world = World(self.gpu, self.scene, meshes=self._meshes)
         return self._world
 
     def technique(self, family: str) -> Any:
@@ -216,15 +237,27 @@ class Renderer(Closing):
 
     # --- the frame ------------------------------------------------------------------------------------------------
 
-    def draw(self, camera: Camera | None = None, *, jitter: bool = True, casters: bool = True) -> float:
+    def draw(
+        self,
+        camera: Camera | None = None,
+        *,
+        time: float | None = None,
+        jitter: bool = True,
+        casters: bool = True,
+    ) -> float:
         """Record and submit one frame, without waiting for it; returns the host's time in milliseconds.
 
         Args:
             camera: in place of the scene's.
+            time: seconds at which the scene's ``motion`` is asked where things are; None leaves them.
             jitter: False draws through the pixels' centres whatever the antialiasing technique.
             casters: False leaves shadow maps empty, so that light reaches everything.
         """
-        begin = time.perf_counter()
+        begin = perf_counter()
+        if time is not None and time != self._time and self.scene.motion:
+            for name, moves in self.scene.motion(time).items():
+                self.move(name, moves)
+            self._time = time
         try:
             self._record(camera or self.scene.camera, jitter, casters)
         except BaseException:
@@ -235,7 +268,8 @@ class Renderer(Closing):
         self.gpu.submit()
         self._frame += 1
         self._history += 1
-        return (time.perf_counter() - begin) * 1e3
+        self._moved = False
+        return (perf_counter() - begin) * 1e3
 
     def _record(self, camera: Camera, jitter: bool, casters: bool) -> None:
         gpu, images = self.gpu, self._images
@@ -247,11 +281,18 @@ class Renderer(Closing):
         scope = self._scope
 
         targets = [(images[name].view(), (0.0, 0.0, 0.0, 0.0)) for name in self._targets]
+        if self._fields:
+            field = self._fields.field
+            self._uploaded = field.uploaded - self._sent
+            field.update()
+            self._sent = field.uploaded
         # Its stencil, where it has one, is cleared with it: drivers pack the two, and clear both at once or neither.
         clear = 0 if images["depth"].has_stencil else None
         with gpu.render("gbuffer.mesh", targets, (images["depth"].view(), 0.0), stencil=clear) as native:
             for content in self._content:
                 content.draw_gbuffer(native, scope, emissive="emissive" in self._targets)
+        for content in self._content:
+            content.march_gbuffer(scope, images["depth"], emissive="emissive" in self._targets)
 
         shadow = self._view("shadow")
         shadow.maps_wanted = self.technique("volumetric").reads_maps
@@ -292,6 +333,8 @@ class Renderer(Closing):
 
     def _update(self, camera: Camera, jitter: bool) -> None:
         shift = self.technique("antialiasing").jitter(self._frame) if jitter else (0.0, 0.0)
+        if self._moved:
+            self._history = min(self._history, 8)
         if camera != self._camera_seen:
             self._history = 0 if self._camera_seen is None else min(self._history, 8)
             self._camera_seen = camera
@@ -299,8 +342,84 @@ class Renderer(Closing):
         row = shifted(self._camera_row, shift)
         row["previous_view_proj"] = row["still_view_proj"] if self._previous is None else self._previous
         row["frame"], row["seed"], row["history"] = self._frame, self.seed, self._history
+        row["moved"] = self._moved
         self._previous = row["still_view_proj"]
         self.gpu.write(self._camera, row)
+
+    # --- motion ---------------------------------------------------------------------------------------------------
+
+    def place(self, which: int | str, transform: ArrayLike) -> None:
+        """From the next frame on, an implicit surface stands elsewhere. It is one small upload, and nothing of its
+        field is evaluated anew.
+
+        Args:
+            which: its number in ``scene.implicits``, or its name.
+            transform: 4×4, from its own space to the world, in place of the one that it has.
+
+        Raises:
+            ParameterError: there is none such, or a transform that has no inverse.
+        """
+        if isinstance(which, str):
+            found = self._objects(which) or [self._unknown(which)]
+            if len(found) > 1:
+                raise ParameterError(f"which: {len(found)} implicit surfaces are called '{which}'; give a number")
+            which = found[0]
+        if self._fields is None or not 0 <= which < len(self.scene.implicits):
+            raise ParameterError(f"which: the scene has {len(self.scene.implicits)} implicit surfaces, and no {which}")
+        (matrix,) = transforms("transform", transform)
+        placed = replace(self.scene.implicits[which], transform=matrix)
+        self._fields.field.place(which, matrix)
+        self._moved = True
+        if placed.bounds is not None:
+            self._hold(*placed.bounds)
+
+    def move(self, name: str, moves: ArrayLike) -> None:
+        """From the next frame on, objects or parts of a name are moved from where they stand at rest; as in
+        :class:`~tyndall.scene.model.Scene`, ``motion``. Maps of lights are not fitted anew to parts: a scene's
+        ``room`` says how far they may go.
+
+        Args:
+            moves: one 4×4 transform, (N, 4, 4) for N objects or parts of that name, or (N, 3) ways in metres.
+
+        Raises:
+            ParameterError: no such name, or what are no transforms.
+        """
+        matrices = transforms(name, moves)
+        objects = self._objects(name)
+        if len(matrices) < len(objects):
+            raise ParameterError(f"{name}: {len(matrices)} transforms for {len(objects)} objects")
+        for index, matrix in zip(objects, matrices, strict=False):
+            self.place(index, matrix @ np.asarray(self.scene.implicits[index].transform))
+        if self._fields and name in self._fields.parts:
+            self._fields.field.move(name, matrices[len(objects) :])
+            self._moved = True
+        elif not objects:
+            self._unknown(name)
+
+    def _objects(self, name: str) -> list[int]:
+        return [i for i, one in enumerate(self.scene.implicits) if name and one.name == name]
+
+    def _unknown(self, name: str) -> int:
+        known = {one.name for one in self.scene.implicits if one.name} | (self._fields.parts if self._fields else set())
+        raise ParameterError(f"no object or part '{name}'{nearest(name, sorted(known))}")
+
+    @property
+    def uploaded(self) -> int:
+        """Bytes that the last frame's implicit surfaces were sent to the device anew: 0 where nothing has moved."""
+        return self._uploaded
+
+    def _hold(self, low: NDArray[np.float64], high: NDArray[np.float64]) -> None:
+        """Let the scene's box hold another one: by more than it needs, so that maps are seldom fitted anew."""
+        lower, upper = self.scene.bounds
+        if (low >= lower).all() and (high <= upper).all():
+            return
+        spare = 0.25 * (np.maximum(high, upper) - np.minimum(low, lower))
+        corners = np.where(low < lower, low - spare, lower), np.where(high > upper, high + spare, upper)
+        self.scene = self.scene.with_(room=tuple(tuple(float(x) for x in corner) for corner in corners))
+        for view in self._views.values():
+            view.scene = self.scene
+        if self._camera_seen is not None:
+            self._camera_row = pack_camera(self._camera_seen, self.scene, self.size, self.gpu.dtype(_CAMERA))
 
     def dim(self, factor: float) -> None:
         """From the next frame on, all lights shine with this factor of their intensity, ≥ 0; what is ambient stays."""
@@ -362,6 +481,39 @@ class Renderer(Closing):
         gpu.forget_groups()
         with np.errstate(divide="ignore"):
             return np.float32(self._camera_seen.near if self._camera_seen else 1) / raw
+
+    def surface(self, name: str) -> NDArray[Any]:
+        """What the G-buffer holds of what each pixel shows, (height, width) or (height, width, 3).
+
+        Args:
+            name: "normals" (world, of unit length), "roughness", "albedo", "metallic" or "emissive", all float32 and 0
+                for the background; of implicit surfaces "ids", the object's number from 1 on and 0 for anything else,
+                and "steps", how many the march through the pixel took, both uint32.
+
+        Raises:
+            ParameterError: an unknown name.
+        """
+        images: dict[str, tuple[str, Any]] = {
+            "normals": ("normal_roughness", slice(0, 3)),
+            "roughness": ("normal_roughness", 3),
+            "albedo": ("albedo_metallic", slice(0, 3)),
+            "metallic": ("albedo_metallic", 3),
+            "emissive": ("emissive", slice(0, 3)),
+        }
+        if name in ("ids", "steps"):
+            if self._fields is None:
+                return np.zeros(self.size[::-1], np.uint32)
+            return self._fields.found()[name]
+        if name not in images:
+            raise ParameterError(f"surface: no '{name}'{nearest(name, [*images, 'ids', 'steps'])}")
+        image, channels = images[name]
+        if name == "emissive" and name not in self._targets:
+            return np.zeros((*self.size[::-1], 3), np.float32)
+        texels = self.gpu.read_texture(self._images[image]).astype(np.float32)
+        if image == "albedo_metallic":
+            texels /= 255
+            texels[..., :3] **= 2  # as albedo.wesl has it
+        return np.ascontiguousarray(texels[..., channels])
 
     def timings(self) -> dict[str, float]:
         """GPU milliseconds of the last frame by pass name, and "frame" for the whole; waits for it.

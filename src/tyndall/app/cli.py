@@ -113,6 +113,13 @@ def render(
     frames: Annotated[int, typer.Option(metavar="N", min=1, help="Frames to draw; the last is kept.")] = 16,
     adapter: AdapterName = None,
     seed: Seed = 0,
+    time: Annotated[
+        float | None, typer.Option(metavar="S", help="Seconds into the motion of a scene that has one.")
+    ] = None,
+    view: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="Not the picture but steps, normals, depth, ids, albedo or roughness."),
+    ] = None,
     out: Out = None,
     as_json: Json = False,
 ) -> None:
@@ -127,25 +134,35 @@ def render(
     parameters = _parameters(context.obj.flags, "volumetric", [technique], families, model)
     with console.Work("loading") as work:
         described = open_scene(scene, lights)
+        if time is not None:
+            if described.motion is None:
+                raise ParameterError(f"--time: nothing moves in {scene}")
+            described = described.at_time(time)
         folder = out or Path("out", Path(scene.replace(":", "-")).stem)  # not the name in a file, which may be a path
         from tyndall.lab.picture import check_folder
         from tyndall.lab.render import render as draw
+        from tyndall.lab.views import render_view
 
         check_folder(folder)
         work.advance(0.3, "drawing")
-        picture = draw(
-            described, size=pixels, parameters=parameters, frames=frames, adapter=adapter, seed=seed, **families
-        )
+        if view is not None:
+            picture = render_view(described, view, pixels, adapter=adapter)
+        else:
+            picture = draw(
+                described, size=pixels, parameters=parameters, frames=frames, adapter=adapter, seed=seed, **families
+            )
         work.advance(0.9, "saving")
         folder.mkdir(parents=True, exist_ok=True)
-        files = [picture.save(folder / f"{technique}{suffix}") for suffix in (".png", ".exr")]
+        files = [picture.save(folder / f"{view or technique}{suffix}") for suffix in (".png", ".exr")]
     if as_json:
         document = {
             "adapter": picture.metadata["adapter"],
             "scene": described.name,
             "triangles": described.triangle_count,
+            "implicits": len(described.implicits),
             "size": list(picture.size),
             "technique": technique,
+            **({"view": view} if view else {}),
             "image": str(files[0]),
             "exr": str(files[1]),
         }
@@ -153,7 +170,7 @@ def render(
     else:
         width, height = picture.size
         name = "".join(c if c.isprintable() else "\ufffd" for c in described.name)  # a file's, for a terminal
-        print(f"{files[0]}  ({name}, {technique}, {width}×{height}, {picture.metadata['adapter']})")
+        print(f"{files[0]}  ({name}, {view or technique}, {width}×{height}, {picture.metadata['adapter']})")
         print(files[1])
 
 

@@ -1,7 +1,8 @@
-"""What every kind of scene content can do: meshes now; implicit surfaces, particles and terrain in the same words.
+"""What every kind of scene content can do: meshes and implicit surfaces now; particles and terrain in the same words.
 
 Content draws itself into the G-buffer and draws its depth from a light; with these two it is seen, and casts and
-receives shadows by every technique that works on images. What consists of polygons can also describe its outline, from
+receives shadows by every technique that works on images. What is not drawn with triangles is marched by compute passes
+before or after the render pass of the others. What consists of polygons can also describe its outline, from
 which shadow volumes and penumbra wedges are made; what cannot, or only in part, says so, and these techniques then take
 the shadow of the rest from a shadow map. What is drawn with triangles or quads can also draw its shadow on planes;
 ``casting.wesl`` has what its shaders need for that. Rays meet it through :mod:`tyndall.tracing`.
@@ -13,7 +14,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 from tyndall.gpu.device import Blend
-from tyndall.gpu.resources import Bound, Resource
+from tyndall.gpu.resources import Bound, Resource, Texture
 
 if TYPE_CHECKING:
     from tyndall.content.outline import Outline
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
 Cull = Literal["none", "front", "back"]
 Casters = Literal["all", "beside_outline"]
+Prepared = Literal["depth", "flattened", "silhouette"]
 
 PLANE_FORMAT = "depth32float"
 """Of the depth that stands for the plane that a pixel shows."""
@@ -41,6 +43,26 @@ class Content(Protocol):
     def draw_gbuffer(self, native_pass: Any, scope: Mapping[str, Bound], *, emissive: bool) -> None:
         """Draw into the G-buffer; ``scope`` binds ``camera``. It has an emissive target only if some content emits."""
 
+    def march_gbuffer(self, scope: Mapping[str, Bound], depth: Texture, *, emissive: bool) -> None:
+        """Put what is not drawn with triangles into the G-buffer, where it is nearer than what has been drawn.
+
+        Args:
+            scope: binds ``camera``, ``depth``, and for compute to write ``normal_roughness_out``,
+                ``albedo_metallic_out`` and, if some content emits, ``emissive_out``.
+            depth: to be drawn into.
+        """
+
+    def prepare(self, what: Prepared, scope: Mapping[str, Bound], size: tuple[int, int], owner: str) -> None:
+        """Record the compute passes that ``draw_depth``, ``draw_flattened`` or ``draw_silhouette`` need, before the
+        render pass that it is called in.
+
+        Args:
+            scope: what that method gets; for "flattened", once for all lights and planes, what the frame binds, and
+                as ``which`` a depth that is above 0 where a pixel shows a plane.
+            size: of what is drawn into.
+            owner: first part of the passes' names.
+        """
+
     def draw_depth(self, native_pass: Any, scope: Mapping[str, Bound], cull: Cull, casters: Casters = "all") -> None:
         """Draw depth as a light sees it; ``scope`` binds ``shadow_layers`` and ``layer``.
 
@@ -53,8 +75,8 @@ class Content(Protocol):
         """Darken what is in its shadow on a plane, as a camera sees it; what cannot be flattened draws nothing.
 
         Args:
-            scope: binds ``camera``, ``flattenings`` and ``flattening``; the depth test is for equality, and the
-                viewport sets the depth.
+            scope: binds ``camera``, ``flattenings``, ``flattening`` and its light's number ``light_index``; the depth
+                test is for equality, and the viewport sets the depth.
         """
 
     def draw_silhouette(self, native_pass: Any, scope: Mapping[str, Bound], targets: int) -> None:

@@ -16,7 +16,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from tyndall.content.contract import PLANE_FORMAT, SHADE_TARGET, Casters, Cull
+from tyndall.content.contract import PLANE_FORMAT, SHADE_TARGET, Casters, Cull, Prepared
 from tyndall.content.outline import Outline, Placed
 from tyndall.content.rasterize import Triangles
 from tyndall.gpu.device import Blend, Gpu, Raster
@@ -29,7 +29,7 @@ OWNER = "mesh"
 
 GBUFFER_TARGETS: tuple[tuple[str, Blend | None], ...] = (
     ("rgba16float", None),
-    ("rgba8unorm-srgb", None),
+    ("rgba8unorm", None),  # the square root of the colour: compute cannot write sRGB
     ("rgba16float", None),
 )
 MAP_FORMAT = "depth32float"
@@ -236,6 +236,12 @@ class Meshes:
         """Draw into the G-buffer; ``scope`` binds ``camera``."""
         count = len(GBUFFER_TARGETS) if emissive else 2
         self._replay(native_pass, _Way("gbuffer", "back", count, self._gpu.depth_format), scope)
+
+    def march_gbuffer(self, scope: Mapping[str, Bound], depth: Texture, *, emissive: bool) -> None:
+        """Nothing: all of it is drawn."""
+
+    def prepare(self, what: Prepared, scope: Mapping[str, Bound], size: tuple[int, int], owner: str) -> None:
+        """Nothing is needed."""
 
     def draw_depth(self, native_pass: Any, scope: Mapping[str, Bound], cull: Cull, casters: Casters = "all") -> None:
         """Draw depth from a light; ``scope`` binds ``shadow_layers`` and ``layer``.

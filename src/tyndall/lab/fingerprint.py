@@ -2,7 +2,8 @@
 
 The hash covers all that reaches a picture: geometry, transforms, materials and their texels, lights, camera, medium,
 background and ambient light. Names of the scene and its parts, and the looks that techniques start from, do not count:
-the techniques' own parameters are written beside the hash.
+the techniques' own parameters are written beside the hash. Nor does motion: a scene's hash is that of the scene at
+rest, and a moment's that of :meth:`~tyndall.scene.model.Scene.at_time`.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ import numpy as np
 import tyndall
 from tyndall.scene.model import Scene
 
-_NAMES = frozenset({"name", "looks"})
+_NAMES = frozenset({"name", "looks", "motion"})
 _PACKAGES = ("wgpu", "wesl-py", "numpy", "scikit-image", "flip-evaluator", "mitsuba")
 
 

@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, ClassVar, Literal, Protocol, get_args
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from tyndall.gpu.params import ParameterError, check, param
 
@@ -397,6 +397,9 @@ class Instance:
 class Solid(Protocol):
     """What the scene must know of an implicit surface: :class:`tyndall.sdf.Shape` is one."""
 
+    def moved(self, moves: Mapping[str, Iterator[NDArray[np.float64]]]) -> Solid:
+        """The same with its named parts moved, each part by the next of its name's 4×4 transforms."""
+
     dimension: int
 
     @property
@@ -461,6 +464,9 @@ class Camera(_Checked):
             raise ParameterError("target: the camera looks along its up direction, or nowhere")
 
 
+Motion = Callable[[float], Mapping[str, ArrayLike]]
+
+
 @dataclass(frozen=True, eq=False)
 class Scene:
     """Everything a picture is made of.
@@ -468,8 +474,15 @@ class Scene:
     ``looks`` holds, by technique name, the parameters that suit this scene (``{"froxel": {"z_limit": 17.6}}``); a
     technique made for the scene starts from them.
 
+    ``motion`` says where implicit surfaces are at a time in seconds: by the name of an object, or of a part of one, how
+    it is moved from where it stands at rest, in the space that holds it (an object: the world). That is one 4×4
+    transform, (N, 4, 4) for N of the same name in the order in which they stand in the scene, or (N, 3) for ways in
+    metres; see :func:`transforms`. :meth:`at_time` is the still scene of a moment. ``room`` is a box that what moves
+    does not leave, so that maps need not be fitted anew.
+
     Raises:
-        ParameterError: an instance or light that is none, a colour that is negative or not finite.
+        ParameterError: an instance or light that is none, a colour that is negative or not finite, an upper corner
+            below the lower one.
     """
 
     instances: tuple[Instance, ...] = ()
@@ -481,9 +494,13 @@ class Scene:
     looks: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     name: str = "scene"
     implicits: tuple[Implicit, ...] = ()
+    motion: Motion | None = None
+    room: tuple[Vec3, Vec3] | None = param(None, doc="lower and upper corner of all that moves", unit="m")
 
     def __post_init__(self) -> None:
         check(self)
+        if self.room is not None and not all(a <= b for a, b in zip(*self.room, strict=True)):
+            raise ParameterError(f"room: the upper corner {self.room[1]} is below the lower {self.room[0]}")
         object.__setattr__(self, "instances", tuple(self.instances))
         object.__setattr__(self, "lights", tuple(self.lights))
         object.__setattr__(self, "implicits", tuple(self.implicits))
@@ -501,11 +518,15 @@ class Scene:
 
     @cached_property
     def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Lower and upper corner of the world's box, each (3,); the unit cube around 0 without geometry.
+        """Lower and upper corner of the world's box, each (3,), ``room`` included; the unit cube around 0 without
+        geometry.
 
         Implicit surfaces that have no end do not count.
         """
         lows, highs = [], []
+        if self.room is not None:
+            lows.append(np.array(self.room[0]))
+            highs.append(np.array(self.room[1]))
         for instance in self.instances:
             low, high = (c.astype(np.float64) for c in instance.mesh.bounds)
             matrix = np.asarray(instance.transform)
@@ -523,3 +544,40 @@ class Scene:
     def with_(self, **changes: Any) -> Scene:
         """A copy with some fields replaced."""
         return dataclasses.replace(self, **changes)
+
+    def at_time(self, time: float) -> Scene:
+        """The still scene of a moment, in seconds.
+
+        Raises:
+            ParameterError: ``motion`` gives what are no transforms, or fewer than there are objects or parts.
+        """
+        if self.motion is None:
+            return self
+        moves = {name: iter(transforms(name, value)) for name, value in self.motion(time).items()}
+        moved = []
+        try:
+            for one in self.implicits:
+                place: Any = np.asarray(one.transform)
+                if one.name and one.name in moves:
+                    place = next(moves[one.name]) @ place
+                shape = one.shape.moved(moves)
+                moved.append(dataclasses.replace(one, shape=shape, transform=place))
+        except StopIteration:
+            raise ParameterError("motion: fewer transforms than objects or parts of the name") from None
+        return self.with_(implicits=tuple(moved), motion=None)
+
+
+def transforms(name: str, value: ArrayLike) -> NDArray[np.float64]:
+    """(N, 4, 4) from one 4×4 transform, N of them, or (N, 3) ways in metres.
+
+    Raises:
+        ParameterError: another shape of array; ``name`` says whose.
+    """
+    given = np.asarray(value, np.float64)
+    if given.shape[-2:] == (4, 4) and given.ndim in (2, 3):
+        return given.reshape(-1, 4, 4)
+    if given.ndim == 2 and given.shape[1] == 3:
+        made = np.tile(np.eye(4), (len(given), 1, 1))
+        made[:, :3, 3] = given
+        return made
+    raise ParameterError(f"{name}: shape {given.shape} is neither of 4×4 transforms nor (count, 3) of ways")

@@ -24,7 +24,18 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from tyndall.scene.model import Camera, HenyeyGreenstein, Instance, Material, Medium, Mesh, Scene, SpotLight, Vec3
+from tyndall.scene.model import (
+    Camera,
+    HenyeyGreenstein,
+    Instance,
+    Material,
+    Medium,
+    Mesh,
+    Scene,
+    SpotLight,
+    Vec3,
+    box_corners,
+)
 
 FILL = 0.6  # of the picture's height
 WIDEST = 0.85  # of the picture's width
@@ -79,10 +90,12 @@ def _vec3(v: Points) -> Vec3:
 
 
 def _points(scene: Scene) -> Points:
-    """(N, 3) points of the surface in the world, at most about ``_MOST_POINTS``, spread over all instances."""
+    """(N, 3) points of the surfaces in the world, at most about ``_MOST_POINTS``, spread over all instances; of an
+    implicit surface the corners of its box.
+    """
+    boxes = [box_corners(*one.bounds) for one in scene.implicits if one.bounds is not None]
     if not scene.instances:
-        low, high = scene.bounds
-        return np.array([low, high])
+        return np.concatenate(boxes) if boxes else np.array(scene.bounds)
     total = sum(len(i.mesh.positions) for i in scene.instances)
     step = -(-total // _MOST_POINTS)
     parts, skipped = [], 0
@@ -91,7 +104,7 @@ def _points(scene: Scene) -> Points:
         skipped = (skipped - len(instance.mesh.positions)) % step
         matrix = np.asarray(instance.transform)
         parts.append(chosen @ matrix[:3, :3].T + matrix[:3, 3])
-    return np.concatenate(parts)
+    return np.concatenate([*parts, *boxes])
 
 
 def _frame(points: Points, centre: Points, radius: float) -> Camera:

@@ -228,6 +228,16 @@ class Field(Closing):
             row["first_cell"] = made.first_cell + sum(64**level for level in range(1, made.levels))
         self._write(self._object_buffer, self._rows[index : index + 1], index * self._rows.itemsize)
 
+    def place(self, index: int, transform: Any) -> None:
+        """An object stands elsewhere: one write, and nothing is pruned again."""
+        made = self._objects[index]
+        made.implicit = dataclasses.replace(made.implicit, transform=transform)
+        self._describe(index)
+
+    def move(self, name: str, matrices: Any) -> None:
+        """Parts of a name are moved."""
+        raise NotImplementedError
+
     def _jobs(self, index: int) -> list[Any]:
         """The divisions of an object, coarsest first."""
         made, row = self._objects[index], self._rows[index]

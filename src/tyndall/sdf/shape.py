@@ -32,8 +32,8 @@ Two-dimensional shapes (:attr:`Shape.dimension` 2) lie in the plane of x and y, 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar, Literal
 
@@ -253,6 +253,22 @@ class Shape:
     def named(self, name: str) -> Shape:
         """With a name, by which it can be moved once it is on the device. Several shapes may share a name."""
         return Named(self, name)
+
+    def moved(self, moves: Mapping[str, Iterator[Floats]]) -> Shape:
+        """The same with its named parts moved from where they stand, in the space that holds them.
+
+        Args:
+            moves: by name, 4×4 transforms; each part takes the next, parts before their own parts, in order.
+        """
+        if not self.children:
+            return self
+        step = next(moves[self.name]) if isinstance(self, Named) and self.name in moves else None
+        made = [child.moved(moves) for child in self.children]
+        shape: Shape = self
+        if any(new is not old for new, old in zip(made, self.children, strict=True)):
+            changed = {"shapes": tuple(made)} if isinstance(self, Combination) else {"shape": made[0]}
+            shape = replace(self, **changed)  # type: ignore[type-var]
+        return shape if step is None else shape.transform(step)
 
 
 def _modified(kind: str, *arguments: Any) -> Shape:

@@ -17,6 +17,7 @@ from tyndall.gpu.device import ComputePass, Gpu
 from tyndall.gpu.params import check
 from tyndall.gpu.resources import Bound, Buffer, ParamsBuffer, Resource, Texture
 from tyndall.scene.model import Camera, Scene
+from tyndall.sdf.field import Field
 from tyndall.tracing.world import World
 
 
@@ -74,6 +75,7 @@ class View:
         size: width and height of the picture in pixels.
         frame: frames drawn before this one.
         make_world: gives :attr:`world`.
+        fields: the scene's implicit surfaces on the device, up to date; None where it has none.
         owner: "family.name": owner in the ledger and prefix of its passes.
         maps_wanted: whether the volumetric technique reads shadow maps; what a shadow technique need not draw
             otherwise.
@@ -92,6 +94,7 @@ class View:
     maps_wanted: bool = False
     air_wanted: bool = True
     make_world: Callable[[], World] | None = None
+    fields: Field | None = None
     _camera: Camera | None = None
     _resources: dict[str, Resource] = field(default_factory=dict)
     _descriptions: dict[str, Any] = field(default_factory=dict)
@@ -145,6 +148,13 @@ class View:
         assert isinstance(made, Buffer)
         return made
 
+    def fitted(self, label: str, make: Callable[[], NDArray[Any]], *, element: str) -> Buffer:
+        """As :meth:`buffer`, of what depends on the scene's box; written anew when that changes."""
+        made = self.buffer(label, make, element=element)
+        box = tuple(corner.tobytes() for corner in self.scene.bounds)
+        self.keep(f"{label} fitted", box, lambda: self.gpu.write(made, make()))
+        return made
+
     def keep(self, label: str, key: Any, make: Callable[[], Any]) -> Any:
         """What was made for this label, of nothing that must be destroyed; made anew when the key changes."""
         if label not in self._kept or self._kept[label][0] != key:
@@ -189,6 +199,7 @@ class View:
                 make_world=self.make_world,
             )
             self._parts[label] = made
+        made.scene, made.fields = self.scene, self.fields
         made.images, made.scope, made.overlay, made.frame = self.images, self.scope, self.overlay, self.frame
         made.camera, made.maps_wanted, made.air_wanted = self.camera, self.maps_wanted, self.air_wanted
         return made

@@ -74,7 +74,7 @@ class DepthMaps(Technique):
         """Draw all maps of what casts."""
         first_finer = sum(layer_count(light) for light in view.scene.lights)
         count = self.map_count(view.scene)
-        table = view.buffer("layers", lambda: self._rows(view, max(1, count)), element=_LAYER)
+        table = view.fitted("layers", lambda: self._rows(view, max(1, count)), element=_LAYER)
         if count > first_finer:
             self._move_finer(view, table, first_finer)
         shared = {"shadow_layers": table.read(), "shadow_params": view.params}
@@ -86,6 +86,8 @@ class DepthMaps(Technique):
         maps = view.texture("maps", size, "depth32float", dimension="2d-array", usage="sampled target")
         for index in range(count):
             scope = {"shadow_layers": table.read(), "layer": view.gpu.constant(index)}
+            for kind in content:
+                kind.prepare("depth", scope, (self.size, self.size), view.owner)
             with view.gpu.render(view.owner, depth=(maps.view(layer=index), 0.0)) as native:
                 for kind in content:
                     kind.draw_depth(native, scope, self.cull, casters)

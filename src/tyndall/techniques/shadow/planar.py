@@ -85,7 +85,7 @@ class Planar(Technique):
             "shade", (*view.size, max(1, -(-len(lights) // 4))), SHADE_TARGET[0], dimension="2d-array",
             usage="sampled target",
         )  # fmt: skip
-        which = view.texture("which", view.size, PLANE_FORMAT, usage="target")
+        which = view.texture("which", view.size, PLANE_FORMAT, usage="sampled target")
         if content:
             scope = {**view.scope, **bind_planes(view, planes)}
             with gpu.render(f"{view.owner}.which", depth=(which.view(), 0.0)) as native:
@@ -93,6 +93,8 @@ class Planar(Technique):
                 native.set_pipeline(pipeline)
                 native.set_bind_group(0, group)
                 native.draw(3)
+            for kind in content:
+                kind.prepare("flattened", {**view.scope, "which": which.sampled()}, view.size, view.owner)
         table = view.buffer("flattenings", lambda: self._rows(view, pairs), element=_FLATTENING).read()
         width, height = view.size
         for image in range(images.size[2]):
@@ -101,7 +103,12 @@ class Planar(Technique):
                 for row, pair in enumerate(pairs):
                     if pair.light // 4 != image:
                         continue
-                    scope = {"camera": view.scope["camera"], "flattenings": table, "flattening": gpu.constant(row)}
+                    scope = {
+                        "camera": view.scope["camera"],
+                        "flattenings": table,
+                        "flattening": gpu.constant(row),
+                        "light_index": gpu.constant(pair.light),
+                    }
                     depth = (pair.plane + 1) / 32  # as planar.wesl numbers them
                     native.set_viewport(0, 0, width, height, depth, depth)
                     for kind in content:

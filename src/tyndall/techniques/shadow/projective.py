@@ -76,10 +76,12 @@ class Projective(Technique):
             "outlines", (self.size, self.size, max(1, count * images)), SHADE_TARGET[0], dimension="2d-array",
             usage="sampled target",
         )  # fmt: skip
-        table = view.buffer("silhouettes", lambda: self._rows(view, planes), element=_SILHOUETTE).read()
+        table = view.fitted("silhouettes", lambda: self._rows(view, planes), element=_SILHOUETTE).read()
         for layer in range(count):
             targets = [(outlines.view(layer=layer * images + image), (1.0, 1.0, 1.0, 1.0)) for image in range(images)]
             scope = {"silhouettes": table, "layer": gpu.constant(layer)}
+            for kind in content:
+                kind.prepare("silhouette", scope, (self.size, self.size), view.owner)
             with gpu.render(f"{view.owner}.outline", targets) as native:
                 for kind in content:
                     kind.draw_silhouette(native, scope, images)
@@ -97,7 +99,7 @@ class Projective(Technique):
         layers = light_layers(scene, self.size)
         rows = np.zeros(max(1, len(layers)), view.gpu.dtype(_SILHOUETTE))
         for row, layer in zip(rows, layers, strict=False):
-            row["view_proj"] = layer.matrix.T
+            row["view_proj"], row["inverse"] = layer.matrix.T, np.linalg.inv(layer.matrix).T
         first = first_layers(scene)
         for pair in lit_by(scene, planes):
             its = slice(first[pair.light], first[pair.light] + layer_count(scene.lights[pair.light]))

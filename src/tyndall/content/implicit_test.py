@@ -1,0 +1,279 @@
+"""Implicit surfaces in a frame: where they are, what they look like, and their shadows by every technique, against the
+closed form of a sphere and against meshes of the same."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import props
+import pytest
+from props import WHITE, shoot
+
+from tyndall.content.implicit import Fields, materials_of
+from tyndall.frame import Renderer
+from tyndall.gpu.device import Gpu
+from tyndall.gpu.params import ParameterError, fields_of
+from tyndall.scene.model import (
+    Camera,
+    DirectionalLight,
+    Implicit,
+    Instance,
+    Light,
+    Material,
+    Medium,
+    Mesh,
+    PointLight,
+    Scene,
+    SpotLight,
+)
+from tyndall.sdf import sphere
+from tyndall.techniques import FAMILIES
+from tyndall.techniques.shadow.shadow_map import ShadowMap
+from tyndall.techniques.volumetric.march import March
+
+SIZE = (96, 72)
+ABOVE = Camera((2.5, 4, 4.5), (0, 0.3, 0), fov=0.8, near=0.05)
+RADIUS, CENTRE = 0.7, (0.1, 1.1, -0.2)
+QUIET: dict[str, Any] = {"volumetric": "off", "shadow": ShadowMap(size=16), "antialiasing": "none"}
+
+
+def drawn(gpu: Gpu, scene: Scene, *, casters: bool = True, **more: Any) -> np.ndarray:
+    """The surfaces' light."""
+    with Renderer(scene, SIZE, gpu=gpu, volumetric="off", antialiasing="none", **more) as renderer:
+        renderer.draw(casters=casters)
+        return renderer.base()
+
+
+def at(x: float, y: float, z: float) -> Any:
+    """A transform that moves."""
+    matrix = np.eye(4)
+    matrix[:3, 3] = x, y, z
+    return matrix
+
+
+def ball(material: Material = WHITE, rings: int = 96) -> Mesh:
+    """A sphere of RADIUS around 0 as a mesh whose chords are 0.05 % off."""
+    polar, azimuth = np.linspace(0, math.pi, rings + 1), np.linspace(0, 2 * math.pi, 2 * rings, endpoint=False)
+    y, ring = np.cos(polar)[:, None], np.sin(polar)[:, None]
+    grid = np.stack([ring * np.sin(azimuth), np.broadcast_to(y, (rings + 1, 2 * rings)), ring * np.cos(azimuth)], -1)
+    i, j = np.meshgrid(np.arange(rings), np.arange(2 * rings), indexing="ij")
+    k = (j + 1) % (2 * rings)
+    a, b, c, d = (row * 2 * rings + column for row, column in ((i, j), (i + 1, j), (i + 1, k), (i, k)))
+    indices = np.concatenate([np.stack(corners, -1).reshape(-1, 3) for corners in ((a, b, c), (a, c, d))])
+    normals = grid.reshape(-1, 3)
+    return Mesh(RADIUS * normals, indices, normals, material=material)
+
+
+def both(lights: list[Light], **more: Any) -> tuple[Scene, Scene]:
+    """A sphere over a floor: as an implicit surface, and as a mesh."""
+    floor = props.floor(0, 4)
+    implicit = Scene([floor], lights, ABOVE, implicits=[Implicit(sphere(RADIUS), at(*CENTRE), WHITE)], **more)
+    return implicit, Scene([floor, Instance(ball(), at(*CENTRE))], lights, ABOVE, **more)
+
+
+def test_depth_and_normals_are_a_spheres(gpu: Gpu) -> None:
+    scene = Scene(camera=ABOVE, implicits=[Implicit(sphere(RADIUS), at(*CENTRE), WHITE)])
+    seen = props.rays(ABOVE, SIZE)
+    way = np.array(CENTRE) - ABOVE.position
+    along = seen.directions @ way
+    off = way @ way - along**2
+    distance = along - np.sqrt(np.maximum(RADIUS**2 - off, 0))
+    inside = off < (0.98 * RADIUS) ** 2
+    with Renderer(scene, SIZE, gpu=gpu, **QUIET) as renderer:
+        renderer.draw()
+        depth = renderer.depth() * seen.stretch
+        normals = gpu.read_texture(renderer._images["normal_roughness"])[..., :3].astype(float)
+    assert 200 < inside.sum() < 3000
+    pixel = 2 * math.tan(ABOVE.fov / 2) / SIZE[1] * distance
+    cosine = np.sqrt(np.maximum(1 - off / RADIUS**2, 0.01))
+    assert (np.abs(depth - distance) < 0.5 * pixel / cosine)[inside].all()
+    assert np.isinf(depth[off > (RADIUS + pixel.max()) ** 2]).all()
+    expected = (seen.at(np.where(inside, distance, 1)) - CENTRE) / RADIUS
+    assert np.sum(normals * expected, -1)[inside].min() > 0.98, "they are of a place up to half a pixel off"
+    assert np.median(np.sum(normals * expected, -1)[inside]) > 0.9995
+
+
+def test_the_nearer_of_mesh_and_surface_is_seen(gpu: Gpu) -> None:
+    """A wall through the sphere's middle hides its back half, and is hidden by its front half."""
+    red, green = (Material(base_color=(*color, 1), roughness=1) for color in ((1, 0, 0), (0, 1, 0)))
+    for z, shown in ((-3.0, red), (-1.0, green)):
+        scene = Scene(
+            [props.wall(z, 1.0, green)], [], props.AHEAD, ambient=(1, 1, 1),
+            implicits=[Implicit(sphere(0.6), at(0, 0, -2.0), red)],
+        )  # fmt: skip
+        middle = shoot(gpu, scene, props.TINY).base[6, 8]
+        np.testing.assert_allclose(middle, shown.base_color[:3], atol=0.01)
+
+
+def test_the_material_is_an_objects_own(gpu: Gpu) -> None:
+    shine = Material(base_color=(0.2, 0.5, 0.9, 1), metallic=0.25, roughness=0.4, emissive=(0.5, 3, 0.25))
+    matt = Material(base_color=(0.9, 0.04, 0.0, 1), roughness=0.9)
+    objects = [Implicit(sphere(0.4), at(x, 0, -2), material) for x, material in ((-0.6, shine), (0.6, matt))]
+    with Renderer(Scene(camera=props.AHEAD, implicits=objects), props.TINY, gpu=gpu, **QUIET) as renderer:
+        renderer.draw()
+        row = {
+            name: gpu.read_texture(renderer._images[name])[6].astype(float)
+            for name in ("normal_roughness", "albedo_metallic", "emissive")
+        }
+    for column, material in ((4, shine), (11, matt)):
+        albedo = row["albedo_metallic"][column] / 255
+        np.testing.assert_allclose(albedo[:3] ** 2, material.base_color[:3], atol=0.004)
+        np.testing.assert_allclose(albedo[3], material.metallic, atol=0.003)
+        np.testing.assert_allclose(row["normal_roughness"][column, 3], material.roughness, atol=1e-3)
+        np.testing.assert_allclose(row["emissive"][column, :3], material.emissive, atol=1e-3)
+    assert not any(row[name][[0, 7, 8]].any() for name in row), "the background stays empty"
+
+
+LIGHTS = [
+    pytest.param(DirectionalLight((0.5, -1.0, -0.35), 3.0), id="directional"),
+    pytest.param(PointLight((-1.2, 3.2, 0.9), 20.0), id="point"),
+]
+
+
+@pytest.mark.parametrize("name", FAMILIES["shadow"].members)
+@pytest.mark.parametrize("light", LIGHTS)
+def test_every_shadow_technique_shows_the_shadow_of_the_same_mesh(gpu: Gpu, name: str, light: Light) -> None:
+    """On the floor and on the sphere itself; a technique that shades planes alone leaves the sphere lit in both."""
+    technique = FAMILIES["shadow"].make(name)
+    sizes = {f.name: 256 for f in fields_of(type(technique)) if f.name in ("size", "map_size")}
+    shadow = FAMILIES["shadow"].make(name, changes={**sizes, **SHARP.get(name, {})})
+    implicit, mesh, full = (
+        drawn(gpu, scene, shadow=shadow, casters=casters)[..., 0]
+        for scene, casters in zip((*both([light]), both([light])[0]), (True, True, False), strict=True)
+    )
+    dark = (implicit < 0.2 * full) & (full > 0)
+    assert dark.sum() > 60
+    off = np.abs(implicit - mesh) > 0.05 * full.max()
+    assert off.mean() < 0.015, "edges aside, they are the same"
+    inner = dark & np.all([np.roll(dark, step, axis) for step in (-1, 1) for axis in (0, 1)], axis=0)
+    assert off[inner].mean() < 0.05
+
+
+SHARP: dict[str, dict[str, Any]] = {
+    **{name: {"radius": 1.0} for name in ("vsm", "esm", "evsm", "pcf")},
+    "blurred": {"radius": 1, "sigma": 0.5, "depth_aware": True},
+}
+
+
+@pytest.mark.parametrize("name", [name for name in FAMILIES["volumetric"].members if name != "off"])
+def test_every_volumetric_technique_is_blocked_by_it(gpu: Gpu, name: str) -> None:
+    """As by the same mesh, and not as without either."""
+    light = SpotLight((0.1, 4.5, -0.2), (0, -1, 0), 60.0, (1, 1, 1), 0.4, 0.5)
+    changes = {"march": {"steps": 48}, "froxel": {"grid": (48, 36, 48)}}.get(name, {})
+    technique = FAMILIES["volumetric"].make(name, changes=changes)
+    air = Medium(0.1, 0.01, bounds=((-3, 0, -3), (3, 5, 3)))
+    shots = [
+        shoot(gpu, scene, (48, 36), volumetric=technique, shadow=ShadowMap(size=256)).inscattered[..., 0]
+        for scene in (*both([light], medium=air), Scene([props.floor(0, 4)], [light], ABOVE, air))
+    ]
+    implicit, mesh, without = shots
+    error = np.abs(implicit - mesh).mean() / mesh.mean()
+    change = np.abs(without - mesh).mean() / mesh.mean()
+    assert change > 0.05
+    assert error < 0.25 * change
+
+
+def test_a_marched_shaft_is_dark_behind_it(gpu: Gpu) -> None:
+    """The air in the sphere's shadow gets no light at all."""
+    light = DirectionalLight((0, 0, -1), 5.0)
+    camera = Camera((0, 3, -2), (0, 0, -2), up=(0, 0, -1), fov=0.2, near=0.05)
+    medium = Medium(0.1, 0.0, bounds=((-0.3, -0.3, -2.3), (0.3, 0.3, -1.7)))
+    scene = Scene([props.wall(-4)], [light], camera, medium, implicits=[Implicit(sphere(0.6), name="ball")])
+    shot = shoot(gpu, scene, props.TINY, volumetric=March(steps=32, jitter=0), shadow=ShadowMap(size=512))
+    assert shot.inscattered.max() == 0
+
+
+# --- motion -------------------------------------------------------------------------------------------------------
+
+
+def test_a_placed_object_is_drawn_where_it_is(gpu: Gpu) -> None:
+    light = DirectionalLight((0.5, -1.0, -0.35), 3.0)
+    objects = [Implicit(sphere(0.3), at(-1, 0.5, 0), WHITE, "left"), Implicit(sphere(0.3), at(1, 0.5, 0), WHITE)]
+    room = ((-4.0, 0.0, -4.0), (4.0, 3.0, 4.0))
+    scene = Scene([props.floor(0, 4)], [light], ABOVE, implicits=objects, room=room)
+    there = scene.with_(implicits=[Implicit(sphere(0.3), at(-0.2, 1.2, 0.8), WHITE), objects[1]])
+    with Renderer(scene, SIZE, gpu=gpu, volumetric="off", antialiasing="none") as renderer:
+        renderer.draw()
+        first = renderer.uploaded
+        renderer.draw()
+        assert (renderer.uploaded, first > 0) == (0, True), "what stands still is sent once"
+        renderer.place("left", at(-0.2, 1.2, 0.8))
+        renderer.draw()
+        assert 0 < renderer.uploaded < first
+        np.testing.assert_array_equal(renderer.base(), drawn(gpu, there))
+        renderer.move("left", [(0, 0, 0)])
+        renderer.draw()
+        np.testing.assert_array_equal(renderer.base(), drawn(gpu, scene))
+        with pytest.raises(ParameterError, match="did you mean 'left'"):
+            renderer.place("lefd", np.eye(4))
+        with pytest.raises(ParameterError, match="no 2"):
+            renderer.place(2, np.eye(4))
+        with pytest.raises(ParameterError, match="neither of 4×4 transforms"):
+            renderer.move("left", [1, 2])
+
+
+@pytest.mark.parametrize("shadow", ["shadow_map", "projective"])
+def test_maps_are_fitted_anew_where_an_object_leaves_the_scene(gpu: Gpu, shadow: str) -> None:
+    """Its shadow is not lost."""
+    scene = Scene(
+        [props.floor(0, 4)], [DirectionalLight((0.02, -1.0, 0.01), 3.0)], ABOVE,
+        implicits=[Implicit(sphere(0.5), at(0, 0.5, 0), WHITE, "ball")],
+    )  # fmt: skip
+    with Renderer(scene, SIZE, gpu=gpu, volumetric="off", antialiasing="none", shadow=shadow) as renderer:
+        renderer.draw()
+        renderer.place("ball", at(0, 9.0, 0))
+        renderer.draw()
+        high = renderer.base()[..., 0]
+        assert renderer.scene.bounds[1][1] > 9.5
+    seen = props.rays(ABOVE, SIZE)
+    floor = seen.at(-ABOVE.position[1] / seen.directions[..., 1])
+    off = np.hypot(floor[..., 0] - 0.17, floor[..., 2] - 0.085)
+    assert (high[off < 0.42] == 0).all()
+    assert (high[(off > 0.6) & (off < 1.5)] > 0.5).all()
+
+
+def test_a_moment_is_the_same_live_and_still(gpu: Gpu) -> None:
+    def motion(time: float) -> dict[str, Any]:
+        return {"ball": [(math.sin(time), 0.2 * time, 0.0)]}
+
+    scene = Scene(
+        [props.floor(0, 4)], [DirectionalLight((0.5, -1.0, -0.35), 3.0)], ABOVE,
+        implicits=[Implicit(sphere(0.5), at(0, 0.6, 0), WHITE, "ball")], motion=motion,
+        room=((-4, 0, -4), (4, 3, 4)),
+    )  # fmt: skip
+    with Renderer(scene, SIZE, gpu=gpu, volumetric="off", antialiasing="none") as renderer:
+        for time in (0.0, 1.3):
+            renderer.draw(time=time)
+            np.testing.assert_array_equal(renderer.base(), drawn(gpu, scene.at_time(time)))
+        renderer.draw(time=1.3)
+        assert renderer.uploaded == 0
+
+
+def test_what_moves_leaves_no_trail(gpu: Gpu) -> None:
+    """Where a bright ball was, the background is there again after few frames, however still the camera."""
+    glow = Material(emissive=(4, 4, 4))
+    scene = Scene(camera=props.AHEAD, implicits=[Implicit(sphere(0.3), at(-0.5, 0, -2), glow, "ball")])
+    with Renderer(scene, (64, 48), gpu=gpu, volumetric="off", shadow=ShadowMap(size=16)) as renderer:
+        for _ in range(12):
+            renderer.draw()
+        renderer.move("ball", [(1.0, 0, 0)])
+        renderer.draw()
+        assert renderer.radiance()[:, :32].max() < 0.05
+        assert renderer.radiance()[24, 48].min() > 3
+
+
+def test_materials_are_found_in_all_parts() -> None:
+    one, two = Material("one"), Material("two")
+    shape = sphere(1).material(one) | sphere(2).at(1, 0, 0)
+    assert [m.name for m in materials_of(Implicit(shape, material=two))] == ["two", "one"]
+
+
+def test_closing_frees_everything(gpu: Gpu) -> None:
+    before = gpu.ledger.total
+    fields = Fields(gpu, both([])[0], SIZE)
+    assert gpu.ledger.total > before
+    assert sum(resource.size_bytes for resource in fields.resources()) == gpu.ledger.total - before
+    fields.close()
+    assert gpu.ledger.total == before
