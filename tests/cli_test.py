@@ -142,7 +142,7 @@ def test_a_view_is_drawn_in_place_of_the_picture(capsys: pytest.CaptureFixture[s
     assert document["view"] == "normals"
     pixels = pixels_of(folder / document["image"])
     assert pixels.shape == (27, 48, 3)
-    assert sorted(p.name for p in (folder / "made").iterdir()) == ["normals.exr", "normals.png"]
+    assert sorted(p.name for p in (folder / "made").iterdir()) == ["normals.png"]
     for words, said in (
         (("--view", "step"), "did you mean 'steps'"),
         (("--view", "steps"), "box has none"),

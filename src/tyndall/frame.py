@@ -228,7 +228,12 @@ class Renderer(Closing):
     def world(self) -> World:
         """The scene for rays; built when it is asked for first, freed by :meth:`use` once no technique casts any."""
         if self._world is None:
-            self._world = World(self.gpu, self.scene, meshes=self._meshes)
+            self._world = World(
+                self.gpu,
+                self.scene,
+                meshes=self._meshes,
+                fields=self._fields.field if self._fields else None,
+            )
         return self._world
 
     def technique(self, family: str) -> Any:

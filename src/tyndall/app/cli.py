@@ -118,12 +118,14 @@ def render(
     ] = None,
     view: Annotated[
         str | None,
-        typer.Option(metavar="NAME", help="Not the picture but steps, normals, depth, ids, albedo or roughness."),
+        typer.Option(
+            metavar="NAME", help="Not the picture but steps, normals, depth, ids, albedo, roughness or slice."
+        ),
     ] = None,
     out: Out = None,
     as_json: Json = False,
 ) -> None:
-    """Draw one picture: a PNG, and an EXR with linear light and depth."""
+    """Draw one picture: a PNG, and an EXR with linear light and depth; or a PNG of what it is made of."""
     pixels = arguments.parse_size(size)
     names = arguments.split_list([technique])
     if len(names) != 1:
@@ -153,7 +155,8 @@ def render(
             )
         work.advance(0.9, "saving")
         folder.mkdir(parents=True, exist_ok=True)
-        files = [picture.save(folder / f"{view or technique}{suffix}") for suffix in (".png", ".exr")]
+        suffixes = (".png",) if view else (".png", ".exr")
+        files = [picture.save(folder / f"{view or technique}{suffix}") for suffix in suffixes]
     if as_json:
         document = {
             "adapter": picture.metadata["adapter"],
@@ -161,17 +164,16 @@ def render(
             "triangles": described.triangle_count,
             "implicits": len(described.implicits),
             "size": list(picture.size),
-            "technique": technique,
-            **({"view": view} if view else {}),
-            "image": str(files[0]),
-            "exr": str(files[1]),
+            **({"view": view} if view else {"technique": technique}),
+            **{key: str(file) for key, file in zip(("image", "exr"), files, strict=False)},
         }
         print(json.dumps(document, indent=2))
     else:
         width, height = picture.size
         name = "".join(c if c.isprintable() else "\ufffd" for c in described.name)  # a file's, for a terminal
         print(f"{files[0]}  ({name}, {view or technique}, {width}×{height}, {picture.metadata['adapter']})")
-        print(files[1])
+        for file in files[1:]:
+            print(file)
 
 
 @app.command()

@@ -1,9 +1,9 @@
 """What a result was made from: the scene's content hash and the versions that took part.
 
-The hash covers all that reaches a picture: geometry, transforms, materials and their texels, lights, camera, medium,
-background and ambient light. Names of the scene and its parts, and the looks that techniques start from, do not count:
-the techniques' own parameters are written beside the hash. Nor does motion: a scene's hash is that of the scene at
-rest, and a moment's that of :meth:`~tyndall.scene.model.Scene.at_time`.
+The hash covers all that reaches a picture: geometry, expressions of implicit surfaces, transforms, materials and their
+texels, lights, camera, medium, background and ambient light. Names of the scene and its parts, and the looks that
+techniques start from, do not count: the techniques' own parameters are written beside the hash. Nor does motion: a
+scene's hash is that of the scene at rest, and a moment's that of :meth:`~tyndall.scene.model.Scene.at_time`.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import dataclasses
 import hashlib
 import platform
 import struct
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from importlib import metadata
 from typing import Any
 
@@ -33,13 +33,27 @@ def scene_hash(scene: Scene) -> str:
 
 def _digest(value: Any, digests: dict[int, bytes]) -> bytes:
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        if id(value) not in digests:
-            members = {f.name: getattr(value, f.name) for f in dataclasses.fields(value) if f.name not in _NAMES}
-            digests[id(value)] = _digest({"": type(value).__name__, **members}, digests)
+        for part in _from_below(value, digests):
+            members = {f.name: getattr(part, f.name) for f in dataclasses.fields(part) if f.name not in _NAMES}
+            # What a kind of shape is on the device is in its class.
+            kind = [getattr(part, name, "") for name in ("code", "module")] if hasattr(part, "children") else []
+            digests[id(part)] = _digest({"": [type(part).__name__, *kind], **members}, digests)
         return digests[id(value)]
     sha = hashlib.sha256()
     _feed(value, sha.update, digests)
     return sha.digest()
+
+
+def _from_below(value: Any, digests: Mapping[int, bytes]) -> Iterator[Any]:
+    """A value after all that hangs below it and has no digest yet: a shape may be deeper than Python's stack."""
+    waiting = [value]
+    while waiting:
+        missing = [child for child in getattr(waiting[-1], "children", ()) if id(child) not in digests]
+        if missing:
+            waiting += missing
+            continue
+        if id(last := waiting.pop()) not in digests:
+            yield last
 
 
 def _feed(value: Any, update: Callable[[Any], object], digests: dict[int, bytes]) -> None:

@@ -13,6 +13,7 @@ from tyndall.scene.model import (
     DirectionalLight,
     HenyeyGreenstein,
     Image,
+    Implicit,
     Instance,
     Isotropic,
     Material,
@@ -22,6 +23,8 @@ from tyndall.scene.model import (
     Scene,
     Texture,
 )
+from tyndall.sdf import box, sphere, subtraction, union
+from tyndall.sdf.shape import Shape
 
 
 def triangle(height: float = 1.0, material: Material | None = None) -> Mesh:
@@ -68,6 +71,7 @@ turned = ((0, 0, 1, 0), (0, 1, 0, 0), (-1, 0, 0, 0), (0, 0, 0, 1))
         {"medium": Medium(absorption=(0.1, 0.1, 0.1))},
         {"background": (0.0, 0.0, 0.1)},
         {"ambient": (0.0, 0.0, 0.1)},
+        {"implicits": (Implicit(sphere()),)},
     ],
 )
 def test_each_part_of_the_content_counts(change: dict[str, object]) -> None:
@@ -96,3 +100,49 @@ def test_versions_name_what_is_installed() -> None:
     found = versions(("numpy", "no-such-package"))
     assert found["numpy"] == np.__version__
     assert "no-such-package" not in found
+
+
+RED = Material(base_color=(1, 0, 0, 1))
+PARTS = [sphere(0.5), box(1.0), sphere(1.0).at(0.1)]
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        union(*PARTS[::-1]),
+        union(*PARTS[:2]),
+        union(*PARTS, smooth=0.1),
+        union(*PARTS, blend="root"),
+        subtraction(*PARTS),
+        union(sphere(0.5), box(1.0), sphere(1.0).at(float(np.nextafter(0.1, 1)))),
+        union(sphere(0.5), box(1.0), sphere(1.0).at(0.1).material(RED)),
+        union(union(*PARTS[:2]).at(1e-3), PARTS[2]),
+    ],
+)
+def test_each_part_of_a_shape_counts(other: Shape) -> None:
+    """Which node, how they are joined, in which order, where, and of what."""
+    one, two = (make(implicits=(Implicit(shape),)) for shape in (union(*PARTS), other))
+    assert scene_hash(one) != scene_hash(two)
+
+
+def test_an_implicit_surfaces_place_and_material_count_and_its_names_do_not() -> None:
+    base = scene_hash(make(implicits=(Implicit(union(*PARTS)),)))
+    assert scene_hash(make(implicits=(Implicit(union(*PARTS), turned),))) != base
+    assert scene_hash(make(implicits=(Implicit(union(*PARTS), material=RED),))) != base
+    named = union(PARTS[0].named("a"), *PARTS[1:])
+    assert scene_hash(make(implicits=(Implicit(union(*PARTS), name="vase"),))) == base
+    assert scene_hash(make(implicits=(Implicit(named),))) == scene_hash(
+        make(implicits=(Implicit(union(PARTS[0].named("b"), *PARTS[1:])),))
+    )
+
+
+def test_a_deep_shape_has_a_hash() -> None:
+    """As a loop of smooth unions makes it; what is deepest counts."""
+
+    def chain(radius: float) -> Scene:
+        shape: Shape = sphere(radius)
+        for i in range(3000):
+            shape = union(shape, sphere().at(i), smooth=0.1)
+        return make(implicits=(Implicit(shape),))
+
+    assert scene_hash(chain(1.0)) == scene_hash(chain(1.0)) != scene_hash(chain(2.0))

@@ -6,13 +6,15 @@ loaded it. Of its variants the first one is taken that works here: ``cuda_ad_rgb
 which compiles for the processor's vectors and needs an LLVM library (19 is known to work, 15 and 16 to abort;
 ``DRJIT_LIBLLVM_PATH`` names one), and ``scalar_rgb``, which always works, and slowly.
 
-What is rendered: meshes with their instances baked into world space, one mesh per material; all of the material model,
-textures, holes and culling; lights with their size; the medium in its box. The picture is the one that Tyndall's still
+What is rendered: meshes with their instances baked into world space, one mesh per material; implicit surfaces as
+triangles; all of the material model, textures, holes and culling; lights with their size; the medium in its box. The
+picture is the one that Tyndall's still
 frames and :mod:`tyndall.lab.truth` mean: see there for what ambient and emitted light do. What differs:
 
 - textures are read at their finest level, without mip maps, as by the tracer;
 - the medium's box is larger by 3e-4 of its distance from the origin for the light on its way *to* a point, as its faces
   must not coincide with a wall's;
+- implicit surfaces are meshed at ``resolution`` (:mod:`tyndall.lab.meshed`), so they are off by a part of a cell;
 - Mitsuba's rays begin off a surface by 1e-4 of its distance from the origin; thinner gaps between surfaces are lost.
 
 The error of a pixel comes from the scatter of its samples, which are independent.
@@ -45,6 +47,7 @@ from numpy.typing import NDArray
 
 from tyndall.frame import view_matrix
 from tyndall.gpu.params import ParameterError
+from tyndall.lab.meshed import RESOLUTION, meshed
 from tyndall.lab.mitsuba_run import write_ply
 from tyndall.lab.truth import Truth, TruthSettings
 from tyndall.scene.model import (
@@ -183,6 +186,7 @@ def judge(
     settings: TruthSettings | None = None,
     *,
     variant: str | None = None,
+    resolution: int = RESOLUTION,
     progress: Callable[[float], object] | None = None,
 ) -> Truth:
     """Render a scene with Mitsuba until the settings are met.
@@ -192,15 +196,18 @@ def judge(
         settings: as for :func:`tyndall.lab.truth.trace`.
         variant: one of :data:`VARIANTS`; None takes the best that works, and another where that one fails on the way;
             it logs a warning for each that does not work.
+        resolution: of the meshes of implicit surfaces, in cells along each one's longest side.
         progress: hears a fraction of 1, an estimate.
 
     Returns:
         Its ``seconds`` are those of rendering; start, loading and compiling are ``settings["setup"]``. Its
-        ``settings["culled"]`` is the share of camera rays that first met the back of a single-sided surface.
+        ``settings["culled"]`` is the share of camera rays that first met the back of a single-sided surface, and
+        ``settings["resolution"]`` that of implicit surfaces, where the scene has any.
 
     Raises:
         MitsubaError: it is missing, or failed.
-        ParameterError: no scene, a size that is not in whole pixels, or an unknown variant.
+        ParameterError: no scene, a size that is not in whole pixels, an unknown variant, or an implicit surface that
+            cannot be meshed.
     """
     settings = settings or TruthSettings()
     if not isinstance(scene, Scene):
@@ -209,6 +216,10 @@ def judge(
         raise ParameterError(f"size: {size!r} is not a width and a height in whole pixels")
     if variant is not None and variant not in VARIANTS:
         raise ParameterError(f"variant: '{variant}' is not one of {', '.join(VARIANTS)}")
+    if scene.implicits:
+        meshes = meshed(scene, resolution)
+        found = judge(meshes, size, settings, variant=variant, progress=progress)
+        return dataclasses.replace(found, settings={**found.settings, "resolution": resolution})
     if variant is not None:
         return _render(scene, size, settings, _try(variant), progress)
     first = available()

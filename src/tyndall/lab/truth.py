@@ -78,6 +78,7 @@ from tyndall.lab.fingerprint import scene_hash
 from tyndall.scene.bundled.cache import directory, version_of
 from tyndall.scene.files.atomic import atomic_write
 from tyndall.scene.model import Scene
+from tyndall.sdf.paint import materials_of
 from tyndall.tracing.world import World
 
 OWNER = "truth"
@@ -221,7 +222,10 @@ def unit_of(scene: Scene) -> float:
         ParameterError: it is beyond the range of 32-bit numbers.
     """
     start, reach = depth_range(scene.camera, scene)
-    emissive = (max(instance.mesh.material.emissive) for instance in scene.instances)
+    materials = [instance.mesh.material for instance in scene.instances]
+    for implicit in scene.implicits:
+        materials += [implicit.material, *materials_of(implicit.shape)]
+    emissive = (max(material.emissive) for material in materials)
     brightest = max(lights_power(scene, reach - start), *scene.ambient, *scene.background, *emissive)
     if brightest > float(np.finfo(np.float32).max):
         raise _out_of_range()
@@ -601,9 +605,9 @@ def _entry(scene: Scene, size: tuple[int, int], settings: TruthSettings, gpu: Gp
         package / "content" / "mesh.py",
     ]
     sources += sorted(p for p in (package / "wesl").glob("*.wesl"))
-    sources += sorted(
-        p for p in (package / "tracing").iterdir() if p.suffix in (".py", ".wesl") and "_test" not in p.name
-    )
+    for layer in ("sdf", "tracing"):
+        files = (package / layer).iterdir()
+        sources += sorted(p for p in files if p.suffix in (".py", ".wesl") and "_test" not in p.name)
     # Compilers differ in rounding, and may have errors of their own: one truth is no other's.
     drawn = f"{gpu.adapter_info['adapter_type'] == 'CPU'} {metadata.version('wgpu')} {metadata.version('wesl-py')}"
     content = f"{scene_hash(scene)} {size[0]} {size[1]} {settings.depth} {settings.filter} {settings.seed} {drawn}"

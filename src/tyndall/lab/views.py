@@ -5,6 +5,8 @@
 - ``depth``: metres along the view axis on a logarithmic scale, near bright; the legend has both ends.
 - ``ids``: a colour for each implicit surface; meshes grey.
 - ``albedo``, ``roughness``: of the materials.
+- ``slice``: the implicit surfaces' distances in the plane through their middle that faces the camera most, as
+  :func:`tyndall.sdf.slices.show_slice` shows them.
 
 They are drawn through the pixels' centres, without any technique's work.
 """
@@ -22,11 +24,12 @@ from tyndall.gpu.params import ParameterError, nearest
 from tyndall.lab.closeup import heat
 from tyndall.lab.picture import Picture
 from tyndall.lab.stage import adapter_name
-from tyndall.scene.model import Scene
+from tyndall.scene.model import Implicit, Scene
+from tyndall.sdf.shape import Shape, union
 from tyndall.techniques.shadow import ShadowMap
 
 Pixels = NDArray[np.uint8]
-ViewName = Literal["steps", "normals", "depth", "ids", "albedo", "roughness"]
+ViewName = Literal["steps", "normals", "depth", "ids", "albedo", "roughness", "slice"]
 VIEWS: tuple[ViewName, ...] = get_args(ViewName)
 
 _INK, _PAPER = (235, 235, 235), (18, 18, 20)
@@ -55,7 +58,7 @@ def render_view(scene: Scene, name: str, size: tuple[int, int], *, adapter: str 
 
 
 def view(renderer: Renderer, name: str) -> Pixels:
-    """A view of a renderer's last frame, (height, width, 3) uint8.
+    """A view of a renderer's last frame, (height, width, 3) uint8; a slice has a size of its own.
 
     Raises:
         ParameterError: no such view, or one that the scene has nothing for.
@@ -82,6 +85,8 @@ def view(renderer: Renderer, name: str) -> Pixels:
             return _bytes(np.where(there[..., None], 127.5 + 127.5 * renderer.surface("normals"), 0))
         case "albedo":
             return _bytes(255 * np.clip(renderer.surface("albedo"), 0, 1) ** (1 / 2.2))
+        case "slice":
+            return _slice(renderer.scene, renderer.size[1])
         case _:
             return _bytes(255 * np.repeat(renderer.surface("roughness")[..., None], 3, -1))
 
@@ -89,8 +94,25 @@ def view(renderer: Renderer, name: str) -> Pixels:
 def _check(name: str, scene: Scene) -> None:
     if name not in VIEWS:
         raise ParameterError(f"view: no '{name}'{nearest(name, VIEWS)}; there are {', '.join(VIEWS)}")
-    if name in ("steps", "ids") and not scene.implicits:
-        raise ParameterError(f"view: {name} are of implicit surfaces, and {scene.name} has none")
+    if name in ("steps", "ids", "slice") and not scene.implicits:
+        raise ParameterError(f"view: {name} needs implicit surfaces, and {scene.name} has none")
+
+
+def _slice(scene: Scene, height: int) -> Pixels:
+    """A picture of its own size, about ``height`` pixels high."""
+    shape: Any = union(*(placed(one) for one in scene.implicits))
+    axis = int(np.abs(np.subtract(scene.camera.target, scene.camera.position)).argmax())
+    low, high = (corner[axis] for corner in shape.box)
+    middle = 0.5 * (low + high) if np.isfinite(high - low) else 0.0
+    held = {"xyz"[axis]: round(float(middle), 6)}
+    return np.asarray(shape.show_slice(**held, pixels=int(np.clip(height, 64, 2048))).pixels)
+
+
+def placed(one: Implicit) -> Shape:
+    """The shape of an implicit surface where it stands in the world."""
+    shape: Any = one.shape
+    made: Shape = shape.transform(one.transform)
+    return made
 
 
 def _bytes(values: NDArray[Any]) -> Pixels:

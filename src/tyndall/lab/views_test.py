@@ -12,6 +12,7 @@ from tyndall.gpu.params import ParameterError
 from tyndall.lab.views import VIEWS, render_view, view
 from tyndall.scene.model import Implicit, Material, Scene
 from tyndall.sdf import sphere
+from tyndall.sdf.shape import Shape
 from tyndall.techniques.shadow.shadow_map import ShadowMap
 
 SIZE = (64, 48)
@@ -23,7 +24,7 @@ SCENE = Scene([props.wall(-4, 1)], camera=props.AHEAD, implicits=[Implicit(spher
 def test_each_shows_what_is_known(gpu: Gpu) -> None:
     with Renderer(SCENE, SIZE, gpu=gpu, volumetric="off", shadow=ShadowMap(size=16), antialiasing="none") as renderer:
         renderer.draw()
-        shown = {name: view(renderer, name).astype(int) for name in VIEWS}
+        shown = {name: view(renderer, name).astype(int) for name in VIEWS if name != "slice"}
         steps, ids = renderer.surface("steps"), renderer.surface("ids")
         with pytest.raises(ParameterError, match="did you mean 'albedo'"):
             renderer.surface("albdo")
@@ -35,7 +36,7 @@ def test_each_shows_what_is_known(gpu: Gpu) -> None:
     assert (ids[middle], ids[corner]) == (1, 0)
     assert 1 <= steps[middle] < 20
     assert steps[corner] == 0
-    for name in VIEWS:
+    for name in shown:
         assert not shown[name][corner].any(), f"{name}: the background is black"
         assert shown[name][middle].any()
 
@@ -45,6 +46,22 @@ def test_a_legend_stands_where_there_is_room(gpu: Gpu) -> None:
     assert picture.pixels.shape == (135, 240, 3)
     assert picture.pixels[-36:, 8:104].std() > 20
     assert dict(picture.metadata)["view"] == "steps"
+
+
+def test_a_slice_goes_through_the_middle(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
+    held: dict[str, float] = {}
+
+    class Seen:
+        pixels = np.zeros((70, 64, 3), np.uint8)
+
+    def show_slice(shape: Shape, **given: float) -> Seen:
+        held.update(given)
+        np.testing.assert_allclose(shape([(0, 0, -2), (0, 0, -1)]), (-0.5, 0.5))
+        return Seen()
+
+    monkeypatch.setattr(Shape, "show_slice", show_slice)
+    assert render_view(SCENE, "slice", (32, 24), adapter=gpu).size == (64, 70)
+    assert held == {"z": -2.0, "pixels": 64}
 
 
 def test_a_wrong_name_is_refused(gpu: Gpu) -> None:

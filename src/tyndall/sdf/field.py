@@ -3,7 +3,7 @@
 Theory. A sphere tracer asks for the distance some twenty times a ray, and a scene of n parts answers each time with all
 of them, though most are far from the ray. Lipschitz pruning (Barbier, Sanchez, Paris, Michel, Lambert, Boubekeur,
 Paulin, Thonat: *Lipschitz Pruning: Hierarchical Simplification of Primitive-Based SDFs*, 2025) divides an object's box
-into cells, 4³, then each of them into 4³, and again: 64³. A cell walks its parent's program at its centre and leaves
+into 16³ cells, then each of them into 4³: 64³. A cell walks its parent's program at its centre and leaves
 out what cannot matter anywhere inside: of two joined values the one that is beyond the other by more than both can
 change. What stays is a handful of instructions, and its value in the cell is that of the whole, bit for bit up to
 rounding. Cells in which no surface can be hold no program, only the value at their centre.
@@ -20,14 +20,14 @@ of primitives that are in use.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tyndall.gpu.device import Gpu
+from tyndall.gpu.device import ComputePass, Gpu
 from tyndall.gpu.resources import Buffer, Closing, ParamsBuffer, Resource
 from tyndall.scene.model import Implicit
 from tyndall.sdf.marching import Marching
@@ -41,8 +41,13 @@ _MATERIAL = "package::sdf::march::FieldMaterial"
 _PRUNE = "package::sdf::prune"
 _MARGIN = 0.02  # of its longest side, around an object's box
 _DIVIDED = 4  # a program of more instructions has cells
+_COARSE, _FINE = 16, 64  # cells along the longest side, of both levels
 _COUNTERS = 8  # of an object: entries used, overflows, words of marks used at each level
-_LEAST_ENTRIES, _MOST_ENTRIES = 1 << 12, 1 << 22
+_LEAST_ENTRIES, _MOST_ENTRIES = 1 << 12, 1 << 23
+_PART_SIZE = 4096  # instructions for which one part is enough
+_LONG = 512  # instructions: a longer program's leaves are sorted out first
+_LONGEST = 32 * 1024  # of those; beyond, cells walk all of it; as in prune.wesl
+_SEGMENT = 256  # of them, as in prune.wesl
 _FEW_MARKS = 128  # instructions whose marks need no memory; as in prune.wesl
 _MOST_MARKS = 1 << 23  # words
 
@@ -66,7 +71,7 @@ class _Object:
 
     @property
     def cells(self) -> int:
-        return sum(64**level for level in range(1, self.levels + 1))
+        return sum((_COARSE**3, _FINE**3)[: self.levels])
 
 
 class Field(Closing):
@@ -143,10 +148,19 @@ class Field(Closing):
         self._cell_buffer = self._buffer("cells", 16 * max(1, cells), "vec4u")
         self._counter_buffer = self._buffer("counters", 4 * _COUNTERS * max(1, len(self._objects)), "atomic<u32>")
         longest = max((o.program.size for o in self._objects if o.levels), default=1)
-        marks = int(np.clip(64**3 * -(-(longest - _FEW_MARKS) // 16), 64, _MOST_MARKS))
+        marks = int(np.clip(_FINE**3 * -(-(longest - _FEW_MARKS) // 16), 64, _MOST_MARKS))
         self._marks_capacity = marks
         self._mark_buffer = self._buffer("marks", 4 * marks, "u32")
-        self._job_buffer = self._buffer("jobs", self._gpu.dtype(_JOB).itemsize * max(1, 3 * len(self._objects)), _JOB)
+        words = max((-(-o.program.size // 32) for o in self._objects if self._is_long(o)), default=0)
+        self._alive_buffer = self._buffer("alive", 4 * max(1, _COARSE**3 * words), "u32")
+        self._least_buffer = self._buffer("least", 4 * (_COARSE**3 if words else 1), "atomic<u32>")
+        spans = np.zeros((max(1, self._words.shape[0]), 2), np.uint32)
+        for made in self._objects:
+            if self._is_long(made):
+                spans[made.first_word : made.first_word + made.program.size] = made.program.spans
+        self._span_buffer = self._buffer("spans", spans, "vec2u")
+        most_jobs = sum(o.levels + o.program.size // _PART_SIZE for o in self._objects)
+        self._job_buffer = self._buffer("jobs", self._gpu.dtype(_JOB).itemsize * max(1, most_jobs), _JOB)
         self._material_buffer = self._buffer("materials", self._materials(), _MATERIAL)
         self._params = gpu.params(f"{self._owner}.marching", self._marching, owner=self._owner)
         self._write(self._list_buffer, self._words)
@@ -158,7 +172,7 @@ class Field(Closing):
         bounded = bool(np.isfinite(box[0]).all() and np.isfinite(box[1]).all())
         if not bounded or not self._pruning or program.size <= _DIVIDED:
             return 0
-        return 2 if program.size <= 8 else 3
+        return 1 if program.size <= 8 else 2
 
     def _placed_words(self, made: _Object) -> NDArray[np.uint32]:
         words = made.program.words.copy()
@@ -219,13 +233,13 @@ class Field(Closing):
         row["material"] = made.first_material
         row["cell"] = 0.0
         if made.levels:
-            finest = 4**made.levels
+            finest = (_COARSE, _FINE)[made.levels - 1]
             sides = np.maximum(high - low, 1e-6 * longest) + 2 * margin
             width = float(sides.max()) / finest
-            coarse = np.clip(np.ceil(sides / (width * finest / 4) - 1e-6).astype(int), 1, 4)
+            blocks = np.ceil(sides / (width * finest / 4) - 1e-6).astype(int)  # of a quarter of the longest side
             row["cell"] = width
-            row["counts"] = coarse * (finest // 4)
-            row["first_cell"] = made.first_cell + sum(64**level for level in range(1, made.levels))
+            row["counts"] = np.clip(blocks, 1, 4) * (finest // 4)
+            row["first_cell"] = made.first_cell + (_COARSE**3 if made.levels > 1 else 0)
         self._write(self._object_buffer, self._rows[index : index + 1], index * self._rows.itemsize)
 
     def place(self, index: int, transform: Any) -> None:
@@ -239,25 +253,35 @@ class Field(Closing):
         raise NotImplementedError
 
     def _jobs(self, index: int) -> list[Any]:
-        """The divisions of an object, coarsest first."""
+        """The divisions of an object, the coarse one first, each in as many parts as the marks take."""
         made, row = self._objects[index], self._rows[index]
         jobs = []
-        for level in range(1, made.levels + 1):
-            job = np.zeros((), self._gpu.dtype(_JOB))
-            scale = 4 ** (made.levels - level)
-            job["lower"], job["width"] = row["lower"], row["cell"] * scale
-            job["counts"] = row["counts"] // scale
-            job["parent_counts"] = 1 if level == 1 else row["counts"] // (4 * scale)
-            job["first_cell"] = made.first_cell + sum(64**n for n in range(1, level))
-            job["first_parent"] = made.first_cell + sum(64**n for n in range(1, level - 1))
-            job["begin"], job["count"] = made.first_word, made.program.size
-            job["lipschitz"] = made.program.lipschitz
-            job["is_root"], job["is_last"] = level == 1, level == made.levels
-            job["first_entry"], job["capacity"] = made.first_entry, made.capacity
-            job["counters"] = _COUNTERS * index
-            job["marks_capacity"] = self._marks_capacity
-            jobs.append(job)
+        for level in range(made.levels):
+            scale = 4 ** (made.levels - 1 - level)
+            counts = row["counts"] // scale
+            blocks = int(np.prod(counts // 4))
+            parts = min(blocks, -(-made.program.size // _PART_SIZE)) if level else 1
+            for part in range(parts):
+                job = np.zeros((), self._gpu.dtype(_JOB))
+                job["lower"], job["width"] = row["lower"], row["cell"] * scale
+                job["counts"], job["blocks"] = counts, counts // 4
+                job["first_cell"] = made.first_cell + (_COARSE**3 if level else 0)
+                job["first_parent"] = made.first_cell
+                job["begin"], job["count"] = made.first_word, made.program.size
+                job["is_root"] = level == 0
+                first, end = blocks * part // parts, blocks * (part + 1) // parts
+                job["first_block"], job["block_count"] = first, end - first
+                job["first_entry"], job["capacity"] = made.first_entry, made.capacity
+                job["counters"] = _COUNTERS * index
+                job["marks_capacity"] = self._marks_capacity
+                job["alive_words"] = -(-made.program.size // 32) if self._is_long(made) and level == 0 else 0
+                job["margin"], job["lipschitz"] = made.program.margin, made.program.lipschitz
+                jobs.append(job)
         return jobs
+
+    def _is_long(self, made: _Object) -> bool:
+        """Whether its leaves are sorted out before the coarse cells walk its program."""
+        return made.levels > 1 and _LONG < made.program.size <= _LONGEST
 
     def update(self) -> None:
         """Record the pruning of what has changed, before what asks the field."""
@@ -282,17 +306,26 @@ class Field(Closing):
             "implicit_counters": self._counter_buffer.read_write(),
             "implicit_marks": self._mark_buffer.read_write(),
             "implicit_jobs": self._job_buffer.read(),
+            "implicit_least": self._least_buffer.read_write(),
+            "implicit_alive": self._alive_buffer.read_write(),
+            "implicit_spans": self._span_buffer.read(),
         }
-        number = 0
-        for i in dirty:
-            for job in jobs[i]:
-                if int(job["is_root"]) == 0:  # marks of one level are read before the next one begins
-                    gpu.encoder.clear_buffer(self._counter_buffer.native, 4 * (_COUNTERS * i + 2), 4)
-                parents = int(np.prod(job["parent_counts"]))
-                gpu.compute("implicit.prune", _PRUNE, "prune").bind(
-                    scope, implicit_job=gpu.constant(number)
-                ).dispatch_line(64 * parents)
-                number += 1
+        for number, job in enumerate(listed):
+            if number:  # one job's marks are read before the next one begins
+                gpu.encoder.clear_buffer(self._counter_buffer.native, 4 * (int(job["counters"]) + 2), 4)
+            here = {**scope, "implicit_job": gpu.constant(number)}
+            if int(job["alive_words"]):
+                gpu.clear_buffer(self._least_buffer)
+                size = 64 * int(job["block_count"]), -(-int(job["count"]) // _SEGMENT)
+                self._pass("bound_leaves", here).dispatch(*size)
+                self._pass("find_alive", here).dispatch(*size)
+                self._pass("emit_alive", here).dispatch_line(64 * int(np.prod(job["counts"])))
+                continue
+            self._pass("prune", here).dispatch_line(64 * int(job["block_count"]))
+
+    def _pass(self, entry: str, scope: Mapping[str, Any]) -> ComputePass:
+        shared = self._gpu.adapter_info["adapter_type"] != "CPU"  # see prune.wesl
+        return self._gpu.compute(f"{self._owner}.{entry}", _PRUNE, entry).bind(scope).features(shared_loads=shared)
 
     def counters(self) -> NDArray[np.uint32]:
         """(objects, 2): entries of lists that pruning used, or wanted, and cells that had to keep their parent's.

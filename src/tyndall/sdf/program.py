@@ -18,11 +18,15 @@ program where some nodes do not matter is a part of it in the same order, with a
 
 Slots, in vec4f; ``k`` is the width of a smooth join, ``L`` the Lipschitz bound of the value in the object's space:
 
-- LEAF: ``(translation, factor) (a) (b) (k, L, material or −1, −)``, and where it may be turned the three rows of the
+- LEAF: ``(translation, factor) (a) (b) (k, L, material or −1, margin)``, and where it may be turned the three rows of the
   transform from the object's to the leaf's space. The translation is subtracted; the rows hold theirs themselves.
 - COMBINE: ``(k, L, −, −)``.
 - ENTER and LEAVE of a modifier: ``(a) (b) (−, L, −, −)``; of an affine transform (code AFFINE) ``(row) (row) (row)
   (factor, L, −, −)``.
+
+A leaf that only unions lie above has a *margin* ≥ 0, others −1: where its value is above that of the whole by more than
+the margin, it does not matter. A smooth union of width k is at least a − k − k/4 where both of its values matter, so the
+margin is the sum of 5/4 k over the unions above (and what takes its place for the other blends).
 
 Affine transforms are multiplied into the leaves below, except around what changes places by itself and around parts
 with a name, which move as one.
@@ -32,6 +36,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -90,11 +95,14 @@ class Kinds:
         return not any(getattr(shape, "untrusted", False) for shape in shapes)
 
     def wesl(self) -> str:
-        """Text for the bindings module: ``implicit_primitive``, ``implicit_enter`` and ``implicit_leave``."""
-        leaf, enter, leave, texts = [], [], [], []
+        """Text for the bindings module: ``implicit_primitive``, its numbers in the slots or given, ``implicit_enter`` and
+        ``implicit_leave``.
+        """
+        leaf, leaf_of, enter, leave, texts = [], [], [], [], []
         for code, shape in self._primitives.values():
             b = "implicit_slots[at + 1u]" if len(shape.numbers) > 4 or _payload(shape) is not None else "vec4f(0.0)"
             leaf.append((code, f"{_function(shape)}(p, implicit_slots[at], {b})"))
+            leaf_of.append((code, f"{_function(shape)}(p, a, b)"))
             texts.append(getattr(shape, "wesl", ""))
         for code, modifier in self._modifiers.values():
             numbers = "implicit_slots[at], implicit_slots[at + 1u]"
@@ -107,6 +115,7 @@ class Kinds:
             [
                 *dict.fromkeys(text for text in texts if text),
                 _switch("implicit_primitive(code: u32, p: vec3f, at: u32) -> f32", leaf, "0.0"),
+                _switch("implicit_primitive_of(code: u32, p: vec3f, a: vec4f, b: vec4f) -> f32", leaf_of, "0.0"),
                 _switch("implicit_enter(code: u32, p: vec3f, at: u32) -> vec3f", enter, "p"),
                 _switch("implicit_leave(code: u32, d: f32, p: vec3f, at: u32) -> f32", leave, "d"),
             ]
@@ -174,6 +183,7 @@ class Program:
         places: the deepest stack of places.
         lipschitz: L of the whole.
         material_rows: slots whose third number is a material's, or −1.
+        margin: by how much the whole can be below its least leaf; −1 where not all leaves have a margin.
         payload_rows: slots whose first number is that of another slot, where samples begin.
     """
 
@@ -187,10 +197,33 @@ class Program:
     material_rows: NDArray[np.intp]
     payload_rows: NDArray[np.intp]
 
+    margin: float = -1.0
+
     @property
     def size(self) -> int:
         """Instructions."""
         return len(self.words)
+
+    @cached_property
+    def spans(self) -> NDArray[np.uint32]:
+        """(n, 2): of what joins two values, where the first one begins, and where the second one does."""
+        spans = np.zeros((len(self.words), 2), np.uint32)
+        starts: list[int] = []
+        entered: list[int] = []
+        for i, word in enumerate(self.words[:, 0].tolist()):
+            kind, joins = word >> 16 & 0xF, word >> 20 & 0xF != PUSH
+            if kind == LEAF and joins:
+                spans[i] = starts[-1], i
+            elif kind == LEAF:
+                starts.append(i)
+            elif kind == COMBINE:
+                second = starts.pop()
+                spans[i] = starts[-1], second
+            elif kind == ENTER:
+                entered.append(i)
+            elif word & PLACED:
+                starts[-1] = entered.pop()
+        return spans
 
 
 def compile_shape(shape: Shape, kinds: Kinds) -> Program:
@@ -214,6 +247,7 @@ class _Context:
     stretch: float = 1.0
     name: str = ""
     before: Floats | None = None  # of the name: the transform around it
+    margin: float = 0.0
 
     @property
     def is_placed(self) -> bool:
@@ -231,6 +265,7 @@ class _Compiler:
         self._depth = self._places = self._deepest = self._most_places = 0
         self._material_rows: list[int] = []
         self._payload_rows: list[int] = []
+        self._margins: list[float] = []
 
     def compile(self, shape: Shape) -> Program:
         if shape.dimension != 3:
@@ -248,6 +283,7 @@ class _Compiler:
             shape.lipschitz,
             np.array(self._material_rows, np.intp),
             np.array(self._payload_rows, np.intp),
+            max(self._margins) if min(self._margins) >= 0 else -1.0,
         )
 
     # A node leaves one value: pushed, or joined to the value before it where ``join`` is not PUSH.
@@ -312,9 +348,10 @@ class _Compiler:
             (*placement[:3, 3], c.factor),
             numbers[:4],
             numbers[4:],
-            (k, shape.lipschitz * c.stretch, float(self._material(c.material)), 0),
+            (k, shape.lipschitz * c.stretch, float(self._material(c.material)), c.margin),
         )
         self._material_rows.append(slot + 3)
+        self._margins.append(c.margin)
         if turned or c.name:
             self._put(*np.linalg.inv(placement)[:3])
         if c.name:
@@ -350,11 +387,15 @@ class _Compiler:
                 return
             if shape.operation != "subtraction":
                 children.sort(key=lambda child: not _is_deep(child))  # what needs a stack comes first
+            if shape.operation != "union":
+                c = replace(c, margin=-1.0)
             for i, child in enumerate(children):
                 cuts = shape.operation == "subtraction" and i > 0
                 self._emit(child, _cutting(c, cuts), inner if i else PUSH, HARD, 0.0)
         else:
             width, kind = shape.smooth * c.factor, _BLENDS[shape.blend]
+            if shape.operation != "union" or kind == ROOT:
+                c = replace(c, margin=-1.0)
             if shape.operation == "subtraction":
                 self._emit(children[0], c, PUSH, HARD, 0.0)
                 rest = children[1:]
@@ -374,6 +415,8 @@ class _Compiler:
         if len(shapes) == 1:
             self._emit(shapes[0], c, join, blend, k)
             return
+        if c.margin >= 0:
+            c = replace(c, margin=c.margin + width * (25.0 if kind == EXPONENTIAL else 1.25))
         # Pairing from the left gives a first half of a power of two.
         half = 1 << (len(shapes) - 1).bit_length() - 1
         self._pairs(shapes[:half], c, inner, kind, width, PUSH, HARD, 0.0)
@@ -391,7 +434,7 @@ class _Compiler:
         entry = len(self._words)
         self._word(ENTER, AFFINE, flags=PLACED, slot=slot)
         self._entered()
-        inside = replace(c, matrix=np.eye(4), factor=1.0, stretch=c.stretch / factor, name="", before=None)
+        inside = replace(c, matrix=np.eye(4), factor=1.0, stretch=c.stretch / factor, name="", before=None, margin=-1.0)
         self._emit(shape, inside, PUSH, HARD, 0.0)
         self._places -= 1
         if name:
@@ -417,7 +460,7 @@ class _Compiler:
         if shape.warps:
             self._word(ENTER, code, flags=PLACED, slot=slot)
             self._entered()
-        inside = replace(c, stretch=c.stretch * shape.stretch)
+        inside = replace(c, stretch=c.stretch * shape.stretch, margin=-1.0)
         self._emit(shape.shape, inside, PUSH, HARD, 0.0)
         if shape.warps:
             self._places -= 1

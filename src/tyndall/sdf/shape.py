@@ -35,13 +35,16 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tyndall.gpu.params import ParameterError, check, fields_of, param
-from tyndall.scene.model import Material
+from tyndall.scene.model import Material, Mesh
+
+if TYPE_CHECKING:
+    from tyndall.sdf.slices import Slice
 
 Floats = NDArray[np.float64]
 Box = tuple[Floats, Floats]
@@ -270,6 +273,48 @@ class Shape:
             shape = replace(self, **changed)  # type: ignore[type-var]
         return shape if step is None else shape.transform(step)
 
+    # --- showing ---
+
+    def to_mesh(
+        self,
+        resolution: int = 64,
+        *,
+        bounds: tuple[Sequence[float], Sequence[float]] | None = None,
+        material: Material | None = None,
+    ) -> Mesh:
+        """Triangles of the surface; see :func:`tyndall.sdf.meshing.to_mesh`."""
+        from tyndall.sdf import meshing
+
+        return meshing.to_mesh(self, resolution, bounds=bounds, material=material)
+
+    def show_slice(
+        self,
+        *,
+        x: float | None = None,
+        y: float | None = None,
+        z: float | None = None,
+        size: float | None = None,
+        pixels: int = 360,
+    ) -> Slice:
+        """A picture of the values in a plane; see :func:`tyndall.sdf.slices.show_slice`."""
+        from tyndall.sdf import slices
+
+        return slices.show_slice(self, x=x, y=y, z=z, size=size, pixels=pixels)
+
+    def show_gradient(
+        self,
+        *,
+        x: float | None = None,
+        y: float | None = None,
+        z: float | None = None,
+        size: float | None = None,
+        pixels: int = 360,
+    ) -> Slice:
+        """A picture of how fast the values change in a plane; see :func:`tyndall.sdf.slices.show_gradient`."""
+        from tyndall.sdf import slices
+
+        return slices.show_gradient(self, x=x, y=y, z=z, size=size, pixels=pixels)
+
 
 def _modified(kind: str, *arguments: Any) -> Shape:
     """A node of a module that imports this one."""
@@ -320,15 +365,25 @@ class Primitive(Shape):
 
     A subclass is a frozen dataclass of declared parameters with :meth:`Shape.distance`, :meth:`Shape.extent` and what
     differs from "exact, L = 1". Its WESL function is ``fn CODE(p: vec3f, a: vec4f, b: vec4f) -> f32`` in
-    ``package::sdf::solids`` or ``package::sdf::profiles``; ``a`` and ``b`` hold :attr:`numbers`.
+    :attr:`module`; ``a`` and ``b`` hold :attr:`numbers`.
 
     Attributes:
         code: the name of that function.
         module: the WESL module that it is in.
+        module: the WESL module it is in; ``package::sdf::profiles`` for most flat shapes.
     """
 
     code: ClassVar[str]
     module: ClassVar[str] = "package::sdf::solids"
+
+    @property
+    def payload(self) -> NDArray[np.float32] | None:
+        """More numbers than 8, (N,), which the function reads from ``implicit_slots`` by fours.
+
+        Where there are any, ``bitcast<u32>(a.x)`` is the index of their first slot on the device, whatever the first
+        of :attr:`numbers` is.
+        """
+        return None
 
     @property
     def numbers(self) -> tuple[float, ...]:

@@ -25,7 +25,7 @@ fn evaluate(x: vec4f) -> vec4f {
     if hit.t >= FAR {
         return vec4f(0.0);
     }
-    let s = surface_at(hit, x.xyz);
+    let s = surface_at(hit, origin, x.xyz);
     if x.w == 0.0 {
         return vec4f(s.surface.normal, s.surface.roughness);
     }

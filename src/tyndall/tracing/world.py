@@ -1,9 +1,12 @@
-"""A scene that rays can hit: its tree, its triangles, and what a hit needs to know of their materials.
+"""A scene that rays can hit: its tree, its triangles, its implicit surfaces, and what a hit needs to know of materials.
 
 Shaders see it through ``tracing/rays.wesl`` (``occluded``, ``closest``) and ``tracing/surface.wesl`` (``surface_at``),
-with :attr:`World.bindings` in their scope. Vertex attributes, indices and materials are the buffers that
-:mod:`tyndall.content.mesh` draws from; texels lie in a buffer of their own, since a shader cannot choose between
-textures. :mod:`tyndall.tracing.layout` says what is built in which space, :mod:`tyndall.tracing.bvh` how.
+with :attr:`World.bindings` in their scope. A ray first descends the tree over the triangles, then marches through the
+implicit surfaces (:mod:`tyndall.sdf.field`) up to what was found; a scene without any has no code for them.
+
+Vertex attributes, indices and materials are the buffers that :mod:`tyndall.content.mesh` draws from; texels lie in a
+buffer of their own, since a shader cannot choose between textures. :mod:`tyndall.tracing.layout` says what is built in
+which space, :mod:`tyndall.tracing.bvh` how.
 """
 
 from __future__ import annotations
@@ -20,6 +23,7 @@ from tyndall.gpu.device import Gpu, GpuError
 from tyndall.gpu.params import ParameterError
 from tyndall.gpu.resources import Buffer, Closing, Parts, Resource
 from tyndall.scene.model import Mat4, Scene, Texture
+from tyndall.sdf.field import Field
 from tyndall.tracing.bvh import OWNER, STACK, Clustering, Steps
 from tyndall.tracing.layout import arrange, is_flat, place
 
@@ -28,6 +32,20 @@ _MASKED = "package::tracing::masked"
 _BUILD = "package::tracing::build"
 _END = 0xBFFFFFFF  # as tracing/rays.wesl has it
 _MAX_LEAVES = 1 << 30  # a reference has two bits for other things
+# What shaders ask for implicit surfaces, of tracing/fields.wesl or, where there are none, of tracing/no_fields.wesl.
+_FIELDS = """\
+import package::tracing::{module}::{{closest_field, field_at, fields_occlude}};
+import package::tracing::rays::RayHit;
+import package::tracing::surface::TracedSurface;
+fn trace_fields_closest(origin: vec3f, direction: vec3f, near: f32, far: f32) -> RayHit {{
+    return closest_field(origin, direction, near, far);
+}}
+fn trace_fields_occlude(origin: vec3f, direction: vec3f, near: f32, far: f32) -> bool {{
+    return fields_occlude(origin, direction, near, far);
+}}
+fn trace_field_at(hit: RayHit, origin: vec3f, direction: vec3f) -> TracedSurface {{
+    return field_at(hit, origin, direction);
+}}"""
 _WRAP = {"repeat": 0, "clamp": 1, "mirror": 2}
 
 
@@ -36,6 +54,7 @@ class World(Closing):
 
     Args:
         meshes: the scene's meshes where they are on the device already; the world makes its own otherwise.
+        fields: likewise, its implicit surfaces. Whoever moves or edits them updates them; rays see them as they are.
         movable: every instance keeps a space of its own, so that :meth:`move` needs no new build; rays then cross more
             boxes. (What has several instances can be moved in any case.)
 
@@ -47,12 +66,24 @@ class World(Closing):
         GpuError: more triangles than can be numbered, or than fit the device.
     """
 
-    def __init__(self, gpu: Gpu, scene: Scene, *, meshes: Meshes | None = None, movable: bool = False) -> None:
+    def __init__(
+        self,
+        gpu: Gpu,
+        scene: Scene,
+        *,
+        meshes: Meshes | None = None,
+        fields: Field | None = None,
+        movable: bool = False,
+    ) -> None:
         self._gpu = gpu
-        self._own_meshes = meshes is None
+        self._own_meshes, self._own_fields = meshes is None, fields is None
         self._meshes = meshes or Meshes(gpu, scene)
+        self._fields = fields
         self._buffers: list[Buffer] = []
         try:
+            if fields is None and scene.implicits:
+                self._fields = Field(gpu, scene.implicits)
+                self._fields.update()
             dtypes = {
                 name: gpu.dtype(f"{module}::{name}")
                 for module, name in ((_BUILD, "Part"), (_RAYS, "Placed"), (_BUILD, "Box"))
@@ -89,10 +120,13 @@ class World(Closing):
         self._box = self._buffer("box", layout.box, f"{_BUILD}::Box")
         self._starts = self._buffer("starts", 4 * (len(layout.hanging) + 1))
         self.bindings: dict[str, Any] = {
-            "trace_root": self._root.read().declaring(
+            "trace_root": self._root.read()
+            .declaring(
                 TRACE_INSTANCED=layout.instanced,
                 TRACE_MASKED=any(m.alpha_mode == "mask" for m in meshes.material_list),
-            ),
+            )
+            .telling(_FIELDS.format(module="fields" if self._fields else "no_fields")),
+            **(self._fields.bindings if self._fields else {}),
             "trace_nodes": self._nodes.split(),
             "trace_triangles": self._triangles.split(),
             "trace_instances": self._instances.split(),
@@ -256,9 +290,15 @@ class World(Closing):
         """Triangles in the tree: those of a mesh that is placed several times count once."""
         return self._layout.leaves
 
+    @property
+    def fields(self) -> Field | None:
+        """The scene's implicit surfaces on the device; None where it has none."""
+        return self._fields
+
     def resources(self) -> list[Resource]:
-        """What the world holds on the device, without meshes that are another's."""
-        return [*self._buffers, *(self._meshes.resources() if self._own_meshes else ())]
+        """What the world holds on the device, without meshes and implicit surfaces that are another's."""
+        fields = self._fields.resources() if self._fields and self._own_fields else ()
+        return [*self._buffers, *(self._meshes.resources() if self._own_meshes else ()), *fields]
 
     def close(self) -> None:
         """Free all device memory, once what was recorded has been submitted."""
@@ -269,4 +309,6 @@ class World(Closing):
         self._buffers.clear()
         if self._own_meshes:
             self._meshes.close()
+        if self._fields and self._own_fields:
+            self._fields.close()
         self._gpu.forget_groups()

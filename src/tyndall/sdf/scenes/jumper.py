@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from tyndall.scene.bundled.sunlight import Options, suns
 from tyndall.scene.model import Camera, Implicit, Scene
-from tyndall.sdf.scenes.parts import about, ball, egg, limb, paint, rows, spin, strand
+from tyndall.sdf.scenes.parts import about, ball, egg, limb, nearer, paint, rows, spin, strand
 from tyndall.sdf.shape import Floats, Shape, intersection, union
 from tyndall.sdf.solids import box, torus
 
@@ -22,6 +22,7 @@ PERIOD = 1.1  # s, of a hop
 HOPS = 8  # once round
 ROUND = 0.85  # m, radius of the way
 HEIGHT = 1.05  # m, of a hop
+EYE = (-1.55, 1.3, 5.7)
 SUN = (-0.62, -0.66, -0.52)
 
 FUR = paint("#f0713f", 0.75)
@@ -33,8 +34,8 @@ SCARF = paint("#23639c", 0.85)
 FRINGE = paint("#f4cf5d", 0.85)
 GRASS = paint("#7fb04a", 0.95)
 MEADOW = paint("#9cc25a", 0.95)
-FAR = paint("#8fbfa2", 1.0)
-FARTHER = paint("#a9cbc8", 1.0)
+FAR = paint("#7fb896", 1.0)
+FARTHER = paint("#8fc0d0", 1.0)
 PATH = paint("#e2cfa0", 0.9)
 BARK = paint("#7a5138", 0.9)
 CROWNS = (paint("#3f8f5b", 0.95), paint("#5aa453", 0.95), paint("#e79aa6", 0.95))
@@ -105,16 +106,13 @@ def _trunk() -> Shape:
         smooth=0.14,
     )
     tuft = union(
-        *(
-            limb((x / 3, 1.53, 0.1), (x, 1.7 - abs(x), 0.12), 0.05, 0.018).material(FUR)
-            for x in (-0.09, 0.0, 0.1)
-        ),
+        *(limb((x / 3, 1.53, 0.1), (x, 1.7 - abs(x), 0.12), 0.05, 0.018).material(FUR) for x in (-0.09, 0.0, 0.1)),
         smooth=0.03,
     )
     smile = union(*strand([(-0.085, 1.01, 0.475), (0, 0.965, 0.5), (0.085, 1.01, 0.475)], (0.013, 0.017, 0.013), 4))
     scarf = union(
-        torus(0.335, 0.085).orient((0.02, 1, 0.14)).at(0, 0.88, 0.03).material(SCARF),
-        torus(0.325, 0.06).orient((-0.06, 1, 0.1)).at(0, 0.95, 0.03).material(SCARF),
+        torus(0.415, 0.085).orient((0.02, 1, 0.14)).at(0, 0.92, 0.03).material(SCARF),
+        torus(0.39, 0.06).orient((-0.06, 1, 0.1)).at(0, 1.0, 0.04).material(SCARF),
         smooth=0.03,
     )
     tail = union(
@@ -188,14 +186,14 @@ REST = np.linalg.inv(_hop(0.0)[0])
 
 def _ground() -> Shape:
     hills = union(
-        egg((0, -6.0, -1), (17, 6.0, 13)).material(GRASS),
+        egg((0, -6.0, -1), (19, 6.0, 13)).material(GRASS),
         egg((-7.5, -2.2, -7), (6, 3.9, 5)).material(MEADOW),
         egg((7.5, -2.6, -9), (7, 4.6, 5)).material(MEADOW),
         egg((1.5, -3.0, -14), (10, 5.4, 5)).material(GRASS),
         egg((4.2, -0.9, 1.8), (2.2, 1.15, 1.8)).material(MEADOW),
         smooth=1.0,
     )
-    return intersection(hills, box((36, 8, 36)).at(0, 0, -8))
+    return intersection(hills, box((40, 8, 32)).at(0, 0, -6))
 
 
 def _mountains() -> Shape:
@@ -213,7 +211,7 @@ def _mountains() -> Shape:
 def _tree(at: tuple[float, float, float], size: float, crown: int, random: np.random.Generator) -> Shape:
     trunk = union(
         *strand([(0, -0.3, 0), (0.04, 0.5, 0), (-0.02, 1.15, 0.02)], (0.2, 0.13, 0.1), 3),
-        limb((0, 0.8, 0), (0.42, 1.3, 0.05), 0.075, 0.05),
+        limb((0, 0.85, 0), (0.3, 1.4, 0.05), 0.07, 0.05),
         smooth=0.08,
     ).material(BARK)
     balls = [ball((0, 1.75, 0), 0.62)]
@@ -265,7 +263,7 @@ def _stones() -> Shape:
 
 def _floor(x: float, z: float) -> float:
     """About how high the hilltop is."""
-    return -6.0 + 6.0 * math.sqrt(max(0.0, 1 - (x / 17) ** 2 - ((z + 1) / 13) ** 2))
+    return -6.0 + 6.0 * math.sqrt(max(0.0, 1 - (x / 19) ** 2 - ((z + 1) / 13) ** 2))
 
 
 def _props(random: np.random.Generator) -> Shape:
@@ -306,19 +304,24 @@ def jumper(*, lights: int = 1, seed: int = 0) -> Scene:
     """
     options = Options(lights, seed)
     random = np.random.default_rng(options.seed)
-    clouds = union(_cloud((-7.5, 6.6, -20), 1.5), _cloud((6.5, 8.0, -24), 1.9), _cloud((0.5, 8.6, -32), 1.6))
+    clouds = union(
+        _cloud((-7.5, 6.6, -20), 1.5),
+        _cloud((6.5, 8.0, -24), 1.9),
+        _cloud((0.5, 8.6, -32), 1.6),
+        _cloud((-17, 11.5, -30), 2.4),
+    )
     return Scene(
         implicits=(
             Implicit(creature(), rows(_hop(0.0)[0]), FUR, "jumper"),
             Implicit(_ground(), material=GRASS, name="ground"),
             Implicit(_props(random), material=ROCK, name="props"),
-            Implicit(_mountains(), material=FAR, name="mountains"),
-            Implicit(clouds, material=CLOUD, name="clouds"),
+            Implicit(nearer(_mountains(), EYE, 0.6), material=FAR, name="mountains"),
+            Implicit(nearer(clouds, EYE, 0.6), material=CLOUD, name="clouds"),
         ),
         lights=suns(options.lights, SUN, 7.5, (1.0, 0.9, 0.74), (30, 60), 200),
-        camera=Camera((-1.9, 1.55, 6.4), (0.1, 1.42, 0), fov=math.radians(38), exposure=0.0),
-        background=(0.52, 0.74, 0.93),
-        ambient=(0.42, 0.55, 0.72),
+        camera=Camera(EYE, (0.08, 1.5, 0), fov=math.radians(38), exposure=0.0),
+        background=(0.26, 0.56, 1.0),
+        ambient=(0.30, 0.42, 0.60),
         name="jumper",
         motion=motion,
     )

@@ -86,3 +86,9 @@ def rows(matrix: Floats) -> Mat4:
     """A 4×4 array as the tuples that a scene keeps."""
     a, b, c, d = ((float(r[0]), float(r[1]), float(r[2]), float(r[3])) for r in matrix)
     return (a, b, c, d)
+
+
+def nearer(shape: Shape, eye: Sequence[float], factor: float) -> Shape:
+    """Shrunk towards an eye, which sees the same: scenery far away that keeps the scene's box small."""
+    x, y, z = eye
+    return shape.at(-x, -y, -z).scale(factor).at(x, y, z)

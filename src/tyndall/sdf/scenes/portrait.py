@@ -144,9 +144,9 @@ def _flower(color: int, size: float) -> Shape:
     petals = []
     for k in range(6):
         petals.append(egg((0.12, 0, 0.015), (0.1, 0.062, 0.028), spin(0, -16)).transform(spin(z=60.0 * k)))
-    return union(
-        union(*petals).material(PETALS[color]), egg((0, 0, 0.03), (0.06, 0.06, 0.04)).material(YOLK)
-    ).scale(size)
+    return union(union(*petals).material(PETALS[color]), egg((0, 0, 0.03), (0.06, 0.06, 0.04)).material(YOLK)).scale(
+        size
+    )
 
 
 def _ornament() -> Shape:
@@ -209,7 +209,12 @@ def _hair() -> Shape:
         locks.append(_lock(path, (0.22, 0.24, 0.2, 0.07), 5, k))
     # A loose curl before each ear.
     for side in (-1, 1):
-        path = [(0.86 * side, 0.3, 0.56), (0.95 * side, -0.25, 0.52), (0.8 * side, -0.7, 0.5), (0.92 * side, -1.1, 0.42)]
+        path = [
+            (0.86 * side, 0.3, 0.56),
+            (0.95 * side, -0.25, 0.52),
+            (0.8 * side, -0.7, 0.5),
+            (0.92 * side, -1.1, 0.42),
+        ]
         locks.append(_lock(path, (0.045, 0.06, 0.05, 0.014), 6, 3))
     return union(cap, *locks, smooth=0.02)
 
@@ -295,16 +300,20 @@ def _scarf() -> Shape:
                 ribs.append(
                     limb((out * x, high - 0.13, out * z - 0.22), ((out - 0.03) * x, high + 0.13, (out - 0.03) * z - 0.22), 0.035)
                 )  # fmt: skip
-    tail = strand([(-0.42, -2.05, 0.5), (-0.52, -2.6, 0.68), (-0.5, -3.2, 0.72), (-0.58, -3.9, 0.72)], (0.24, 0.27, 0.29), 6)
+    tail = strand(
+        [(-0.42, -2.05, 0.5), (-0.52, -2.6, 0.68), (-0.5, -3.2, 0.72), (-0.58, -3.9, 0.72)], (0.24, 0.27, 0.29), 6
+    )
     flat = union(*tail, smooth=0.06)
     bands = [torus(0.26, 0.06).orient((0.1, 1, 0)).at(-0.52, y, 0.7).material(SCARF[2]) for y in (-3.0, -3.25)]
-    return union(union(*wraps, smooth=0.05), union(*ribs).material(SCARF[1]), flat.material(SCARF[0]), *bands, smooth=0.03)
+    return union(
+        union(*wraps, smooth=0.05), union(*ribs).material(SCARF[1]), flat.material(SCARF[0]), *bands, smooth=0.03
+    )
 
 
 def _backdrop() -> Shape:
-    disc = cylinder(2.75, 0.12).at(-0.55, 0.1, -4.9).material(DISC)
-    wall = box((26, 16, 0.3)).at(0, 0, -5.2).material(WALL)
-    ring = torus(3.05, 0.035).at(-0.55, 0.1, -5.0).material(GOLD)
+    disc = cylinder(3.1, 0.12).at(-0.5, 0.1, -6.9).material(DISC)
+    wall = box((26, 16, 0.3)).at(0, 0, -7.2).material(WALL)
+    ring = torus(3.45, 0.04).at(-0.5, 0.1, -7.0).material(GOLD)
     return union(disc, wall, ring)
 
 
@@ -347,4 +356,5 @@ def portrait(*, lights: int = 1, seed: int = 0) -> Scene:
         ambient=(0.34, 0.38, 0.46),
         name="portrait",
         motion=motion,
+        room=((-2.4, -4.2, -2.0), (2.4, 2.0, 2.0)),
     )

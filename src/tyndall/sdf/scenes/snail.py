@@ -13,16 +13,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tyndall.scene.bundled.sunlight import Options, suns
-from tyndall.scene.model import Camera, Implicit, Scene
-from tyndall.sdf.scenes.parts import about, ball, curve, egg, limb, paint, spin, strand
+from tyndall.scene.model import Camera, Implicit, Material, Scene
+from tyndall.sdf.scenes.parts import about, ball, curve, egg, limb, nearer, paint, spin, strand
 from tyndall.sdf.shape import Floats, Shape, intersection, union
 from tyndall.sdf.solids import box, torus
 
-SUN = (-0.52, -0.62, 0.34)
+VIEWER = (1.9, 2.35, 9.2)
+SUN = (0.46, -0.66, -0.50)
 WHORL = 0.47  # of the size a turn further out
 TURNS = 3.3
 PIECES = 16  # of a turn
-SHELL = (-0.55, 1.62, 0.0)  # m, middle of the shell
+SHELL = (-0.5, 1.72, 0.0)  # m, middle of the shell
 
 SKIN = paint("#d9a677", 0.42)
 PALE = paint("#eac9a0", 0.45)
@@ -43,7 +44,15 @@ CAP = paint("#c9402f", 0.3)
 CREAM = paint("#f4e7cf", 0.7)
 GILLS = paint("#e2cba6", 0.8)
 DEW = paint("#dff2ff", 0.04)
-GLOW = tuple(paint(c, 1.0, glow=g) for c, g in (("#5c8f3a", 0.35), ("#a8b84e", 0.5), ("#2f6a44", 0.35), ("#e0c061", 0.6)))
+GLOW = tuple(
+    Material("glow", (0.0, 0.0, 0.0, 1.0), roughness=1.0, emissive=c)
+    for c in ((0.055, 0.12, 0.05), (0.16, 0.2, 0.07), (0.04, 0.11, 0.07), (0.22, 0.19, 0.08))
+)
+
+
+POSE = np.diag([1.0, 1.0, 1.0, 1.0])
+POSE[:3, 3] = SHELL
+POSE = POSE @ spin(12, 14, 10) @ np.diag([1.14, 1.14, 1.14, 1.0])
 
 
 def whorl(turn: ArrayLike) -> tuple[Floats, Floats, Floats]:
@@ -81,7 +90,7 @@ def _shell() -> Shape:
     forward = (math.sin(0.95), math.cos(0.95), 0.0)
     lip = torus(float(wide[0]) * 0.97, 0.075).orient(forward).at(*mouth[0]).material(LIP)
     whole = union(union(*tube, smooth=0.045), union(*stripes, smooth=0.02).material(STRIPE), lip, smooth=0.025)
-    return whole.transform(spin(12, 14, 10)).at(*SHELL)
+    return whole.transform(POSE)
 
 
 def _skin(random: np.random.Generator) -> Shape:
@@ -103,7 +112,7 @@ def _skin(random: np.random.Generator) -> Shape:
         for side in (-1, 1):
             angle = random.uniform(0.25, 1.25) * side
             warts.append(
-                ball(p + 0.4 * np.array([-0.25 * (i > 4), 0.35 * math.cos(angle), math.sin(angle)]), random.uniform(0.06, 0.1))
+                ball(p + 0.37 * np.array([-0.25 * (i > 4), 0.35 * math.cos(angle), math.sin(angle)]), random.uniform(0.06, 0.1))
             )  # fmt: skip
     body = union(*foot, smooth=0.22).material(SKIN)
     return union(
@@ -119,8 +128,8 @@ EYES = {"left eye": (2.86, 1.6, -0.14), "right eye": (2.82, 1.6, 0.28)}
 
 
 def _stalk(side: int) -> Shape:
-    top = np.array([0.34, 1.02, 0.2 * side])
-    stalk = strand([(0, -0.1, 0), (0.08, 0.4, 0.03 * side), (0.2, 0.78, 0.1 * side), top], (0.13, 0.085, 0.085), 4)
+    top = np.array([0.28 + 0.2 * side, 1.06 - 0.1 * side, 0.24 * side])
+    stalk = strand([(0, -0.1, 0), 0.3 * top + [0, 0.08, 0], 0.7 * top + [-0.02, 0.03, 0], top], (0.13, 0.085, 0.085), 4)
     knob = egg(top + [0.02, 0.05, 0], (0.155, 0.165, 0.155))
     pupil = ball(top + [0.07, 0.07, 0.06], 0.115)
     shine = ball(top + [0.1, 0.14, 0.15], 0.03)
@@ -139,7 +148,17 @@ def creature(random: np.random.Generator) -> Shape:
     eyes = [_stalk(-1 if name == "left eye" else 1).at(*at).named(name) for name, at in EYES.items()]
     smile = strand([(3.14, 1.12, 0.28), (3.24, 1.09, 0.07), (3.14, 1.14, -0.12)], (0.018, 0.022, 0.018), 3)
     body = union(_skin(random), *eyes, _feeler(1), _feeler(-1), smooth=0.05)
-    drops = [ball(np.array(SHELL) + p, r) for p, r in (((-0.2, 1.18, 0.62), 0.075), ((0.5, 0.9, 0.78), 0.06), ((-0.75, 0.75, 0.86), 0.07), ((0.1, 0.86, 0.9), 0.045), ((-1.1, 0.45, 0.6), 0.05))]  # fmt: skip
+    drops = []
+    for turn, lift, size in (
+        (0.19, 0.7, 0.07),
+        (0.3, 1.0, 0.055),
+        (0.42, 0.5, 0.08),
+        (1.24, 0.9, 0.05),
+        (0.08, 0.8, 0.05),
+    ):
+        middle, radius, outward = whorl([turn])
+        way = math.cos(lift) * outward[0] + math.sin(lift) * np.array([0, 0, 1.0])
+        drops.append(ball(POSE[:3, :3] @ (middle[0] + radius[0] * way) + POSE[:3, 3], size))
     return union(body, _shell(), union(*smile).material(EYE), union(*drops).material(DEW))
 
 
@@ -172,8 +191,8 @@ def _stone(random: np.random.Generator) -> Shape:
         smooth=0.5,
     ).material(STONE)
     moss: list[Shape] = []
-    for k in range(44):
-        x, z = random.uniform(-6.2, 6.2), random.uniform(-2.6, 3.4)
+    for k in range(64):
+        x, z = random.uniform(-6.2, 6.2), random.uniform(-2.2, 3.9)
         size = random.uniform(0.3, 0.75)
         high = _top(x, z)
         if high < -2.2:
@@ -214,7 +233,9 @@ def _fallen_leaf() -> Shape:
         egg((0, 0, 0.62), (1.75, 0.9, 1.25)), egg((0, 0, -0.62), (1.75, 0.9, 1.25)),
         ball((0, -4.0, 0), 4.06),
     ) - ball((0, -4.0, 0), 4.0)  # fmt: skip
-    ribs = strand([(-1.9, -0.35, 0), (-0.8, 0.0, 0), (0, 0.07, 0), (0.8, 0.0, 0), (1.4, -0.18, 0)], (0.05, 0.04, 0.02), 6)
+    ribs = strand(
+        [(-1.9, -0.35, 0), (-0.8, 0.0, 0), (0, 0.07, 0), (0.8, 0.0, 0), (1.4, -0.18, 0)], (0.05, 0.04, 0.02), 6
+    )
     for k in range(5):
         x = -0.8 + 0.38 * k
         for side in (-1, 1):
@@ -299,12 +320,13 @@ def snail(*, lights: int = 1, seed: int = 0) -> Scene:
             Implicit(creature(random), material=SKIN, name="snail"),
             Implicit(_stone(random), material=STONE, name="stone"),
             Implicit(_garden(random), material=GREEN, name="garden"),
-            Implicit(_distance(random), material=GLOW[0], name="distance"),
+            Implicit(nearer(_distance(random), VIEWER, 0.55), material=GLOW[0], name="distance"),
         ),
         lights=suns(options.lights, SUN, 8.0, (1.0, 0.88, 0.68), (30, 60), 220),
-        camera=Camera((1.9, 2.35, 9.2), (-0.25, 1.35, 0), fov=math.radians(40), exposure=0.0),
+        camera=Camera(VIEWER, (-0.15, 1.4, 0), fov=math.radians(37), exposure=0.0),
         background=(0.035, 0.085, 0.045),
         ambient=(0.22, 0.30, 0.22),
         name="snail",
         motion=motion,
+        room=((-4.0, -0.5, -1.6), (4.6, 3.4, 1.6)),
     )

@@ -16,10 +16,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from tyndall.gpu.params import check, param
 from tyndall.scene.bundled.sunlight import suns
-from tyndall.scene.model import Camera, Implicit, Scene, Vec3
+from tyndall.scene.model import Camera, Implicit, Scene
 from tyndall.sdf.scenes.parts import paint
 from tyndall.sdf.shape import Floats, Shape, union
-from tyndall.sdf.solids import box, rounded_box, sphere
+from tyndall.sdf.solids import plane, rounded_box, sphere
 
 COUNT = 1000
 SUN = (-0.5, -0.72, -0.48)
@@ -126,11 +126,13 @@ def swarm(count: int = COUNT, lights: int = 1, seed: int = 0) -> Scene:
     """
     options = Options(count, lights, seed)
     shape, places = _swarm(options.count, options.seed)
-    stand: Vec3 = (0.0, HEIGHT, 0.0)
+    stand = (0.0, HEIGHT, 0.0)
+    drops = shape.at(*stand)
+    low, high = (tuple(float(x) for x in corner) for corner in (drops.box[0] - 2 * WAVE, drops.box[1] + 2 * WAVE))
     return Scene(
         implicits=(
-            Implicit(shape.at(*stand), material=COLORS[0], name="drops"),
-            Implicit(box((24.0, 0.4, 24.0)).at(0, -0.2, 0), material=FLOOR, name="floor"),
+            Implicit(drops, material=COLORS[0], name="drops"),
+            Implicit(plane(), material=FLOOR, name="floor"),
         ),
         lights=suns(options.lights, SUN, 8.0, (1.0, 0.93, 0.84), (35, 65), 200),
         camera=Camera((1.4, 3.5, 4.9), (0.0, 1.12, 0.0), fov=math.radians(42), exposure=0.1),
@@ -138,4 +140,5 @@ def swarm(count: int = COUNT, lights: int = 1, seed: int = 0) -> Scene:
         ambient=(0.20, 0.23, 0.32),
         name="swarm",
         motion=Motion(places),
+        room=((low[0], low[1], low[2]), (high[0], high[1], high[2])),
     )

@@ -13,10 +13,11 @@ from numpy.typing import ArrayLike
 
 from tyndall.scene.bundled.sunlight import Options, suns
 from tyndall.scene.model import Camera, Implicit, Material, Scene
-from tyndall.sdf.scenes.parts import ball, egg, limb, paint, spin, strand
+from tyndall.sdf.scenes.parts import ball, egg, limb, nearer, paint, spin, strand
 from tyndall.sdf.shape import Floats, Shape, Y, intersection, union
-from tyndall.sdf.solids import box, cylinder, torus
+from tyndall.sdf.solids import box, ellipsoid, plane, rounded_box, torus
 
+EYE = (-14.5, 1.9, 16.0)
 SUN = (0.70, -0.42, -0.58)
 SPACING = 2.5  # m, from column to column
 FRONT, SIDE = 6, 8  # columns
@@ -26,8 +27,9 @@ SLOPE = math.radians(15.5)  # of the roof
 HALF = SPACING * (FRONT - 1) / 2  # m, from the axis to the outer columns
 BACK = -SPACING * (SIDE - 1)  # m, the last columns; the first are at 0
 BIRDS = 7
+FLIGHT = (9.0, 2.0)  # m, x and z of the middle of their round
 
-MARBLE = paint("#efe2c8", 0.7)
+MARBLE = paint("#e8d8ba", 0.7)
 SHADED = paint("#d9c8aa", 0.8)
 WORN = paint("#d6c8b2", 0.9)
 BLUE = paint("#4d7a99", 0.8)
@@ -210,9 +212,9 @@ def _building() -> Shape:
     ring = block((-HALF - out, y, BACK - out), (HALF + out, y + 1.6, out)) - block(
         (-HALF + out, y - 0.1, BACK + out), (HALF - out, y + 1.7, -out)
     )
-    fillet = block((-HALF - out - 0.07, y + 0.74, BACK - out - 0.07), (HALF + out + 0.07, y + 0.84, out + 0.07)) - block(
-        (-HALF + gap, y, BACK + gap), (HALF - gap, y + 2, -gap)
-    )
+    fillet = block(
+        (-HALF - out - 0.07, y + 0.74, BACK - out - 0.07), (HALF + out + 0.07, y + 0.84, out + 0.07)
+    ) - block((-HALF + gap, y, BACK + gap), (HALF - gap, y + 2, -gap))
     cornice = block((-HALF - 1.2, y + 1.6, BACK - 1.2), (HALF + 1.2, y + 1.9, 1.2))
     half = HALF + 1.25
     rise, length = half * math.tan(SLOPE), half / math.cos(SLOPE)
@@ -313,17 +315,16 @@ def _ground(random: np.random.Generator) -> Shape:
         smooth=1.0,
     )
     stones: list[Shape] = []
-    for _ in range(26):
-        angle, far = random.uniform(-0.2, math.pi + 0.2), random.uniform(1.0, 1.6)
-        x, z = 10.5 * far * math.cos(angle), 1.5 + 7.5 * far * math.sin(angle)
-        size = random.uniform(0.12, 0.5) * far
-        stones.append(
-            egg(
-                (x, -0.02 + 0.1 * size, z),
-                (size, size * random.uniform(0.45, 0.75), size * random.uniform(0.6, 0.9)),
-                spin(random.uniform(-20, 20), random.uniform(0, 360), random.uniform(-20, 20)),
-            )
-        )
+    for k in range(22):
+        angle, far = random.uniform(0.0, math.pi), random.uniform(1.0, 1.5)
+        x, z = 11.0 * far * math.cos(angle), 2.0 + 6.5 * far * math.sin(angle)
+        size = random.uniform(0.1, 0.34) * far
+        turn = spin(random.uniform(-25, 25), random.uniform(0, 360), random.uniform(-25, 25))
+        if k % 2:
+            stone = rounded_box((2 * size, 1.1 * size, 1.4 * size), 0.35 * size).transform(turn)
+        else:
+            stone = ellipsoid((size, 0.5 * size, 0.75 * size)).transform(turn)
+        stones.append(stone.at(x, 0.02, z))
     path = [
         egg((random.uniform(-0.5, 0.5) + 0.9 * math.sin(0.5 * i), 0.07, 2.7 + 0.95 * i), (0.62, 0.07, 0.4), spin(0, 67 * i))
         for i in range(10)
@@ -368,21 +369,20 @@ def _trees(random: np.random.Generator) -> Shape:
         _cypress((-13.2, 0.4, -13.0), 7.5),
         _cypress((13.5, 0.1, -3.5), 9.0),
         _cypress((15.4, 0.1, -6.0), 7.0),
-        _olive((11.6, 0.0, 3.4), 1.25, random),
+        _olive((17.5, 0.0, 4.0), 1.3, random),
         _olive((-17.5, 0.3, -3.0), 1.5, random),
     )
 
 
-def _far() -> Shape:
+def _hills() -> Shape:
     ranges = [
         egg((-75, -8, -120), (48, 21, 12)),
         egg((-20, -8, -140), (46, 25, 12)),
         egg((40, -8, -130), (44, 19, 12)),
         egg((100, -8, -125), (50, 27, 12)),
     ]
-    land = union(*ranges, smooth=4.0).material(HILLS)
-    sea = block((-240, -5, -150), (240, -3.0, 20)).material(SEA)
-    return union(intersection(land, block((-240, -5, -160), (240, 40, -100))), sea)
+    land = intersection(union(*ranges, smooth=4.0), block((-240, -12, -160), (240, 40, -100)))
+    return nearer(land, EYE, 0.45)
 
 
 def _bird() -> Shape:
@@ -395,8 +395,8 @@ def _bird() -> Shape:
 def _flight(time: float) -> Floats:
     """(:data:`BIRDS`, 4, 4) of the gulls' places."""
     k = np.arange(BIRDS)
-    way = 0.16 * time + 2 * math.pi * ((k * 0.381966) % 1) * 0.55 + 1.6
-    far, high = 9.0 + 2.2 * np.sin(2.1 * k), 11.6 + 1.1 * np.cos(1.7 * k) + 0.25 * np.sin(0.9 * time + 2 * k)
+    way = 0.16 * time + 2 * math.pi * ((k * 0.381966) % 1) * 0.5 + 2.4
+    far, high = 8.0 + 2.2 * np.sin(2.1 * k), 9.2 + 1.3 * np.cos(1.7 * k) + 0.25 * np.sin(0.9 * time + 2 * k)
     bank = 0.42 + 0.16 * np.sin(1.3 * time + 1.9 * k)
     matrices = np.zeros((BIRDS, 4, 4))
     matrices[:, 3, 3] = 1
@@ -404,7 +404,7 @@ def _flight(time: float) -> Floats:
     inward = np.stack([-np.cos(way), 0 * way, -np.sin(way)], 1)
     up = np.cos(bank)[:, None] * np.array([0, 1, 0]) + np.sin(bank)[:, None] * inward
     matrices[:, :3, 2], matrices[:, :3, 1], matrices[:, :3, 0] = forward, up, np.cross(up, forward)
-    matrices[:, :3, 3] = np.stack([far * np.cos(way) - 3.0, high, far * np.sin(way) - 6.0], 1)
+    matrices[:, :3, 3] = np.stack([far * np.cos(way) + FLIGHT[0], high, far * np.sin(way) + FLIGHT[1]], 1)
     return matrices
 
 
@@ -431,11 +431,12 @@ def temple(*, lights: int = 1, seed: int = 0) -> Scene:
     plain: dict[str, tuple[Shape, Material]] = {
         "columns": (_columns(), MARBLE),
         "building": (_building(), MARBLE),
-        "statue": (_statue().rotate(-0.35, Y).at(-7.9, 0.0, 6.6), MARBLE),
+        "statue": (_statue().rotate(-0.35, Y).at(-0.5, 0.0, 8.0), MARBLE),
         "ruins": (_ruins(), WORN),
         "ground": (_ground(random), TURF),
         "trees": (_trees(random), CYPRESS),
-        "far": (_far(), HILLS),
+        "hills": (_hills(), HILLS),
+        "sea": (plane().at(0, -3.0, 0), SEA),
     }
     birds = union(*(_bird().transform(m).named("gulls") for m in _flight(0.0))).material(FEATHER)
     return Scene(
@@ -444,10 +445,11 @@ def temple(*, lights: int = 1, seed: int = 0) -> Scene:
             Implicit(birds, material=FEATHER, name="birds"),
         ),
         lights=suns(options.lights, SUN, 9.0, (1.0, 0.80, 0.56), (20, 50), 200),
-        camera=Camera((-14.5, 1.9, 16.0), (-0.4, 4.6, -1.0), fov=math.radians(42), exposure=-0.2),
-        background=(0.42, 0.60, 0.86),
-        ambient=(0.42, 0.50, 0.66),
+        camera=Camera(EYE, (-0.4, 4.6, -1.0), fov=math.radians(42), exposure=0.0),
+        background=(0.22, 0.45, 0.92),
+        ambient=(0.22, 0.28, 0.43),
         looks={"ray_traced_ao": {"radius": 2.0}},
         name="temple",
         motion=motion,
+        room=((FLIGHT[0] - 12, 6.0, FLIGHT[1] - 12), (FLIGHT[0] + 12, 12.0, FLIGHT[1] + 12)),
     )
