@@ -205,7 +205,7 @@ def value_noise(p: Floats, seed: int) -> Floats:
     t = p - cell
     s = t * t * (3 - 2 * t)
     x, y, z = (cell[:, axis].astype(np.int64).astype(np.uint32) for axis in range(3))
-    one, first = np.uint32(1), np.uint32(seed)
+    one, first = np.uint32(1), pcg(np.array([seed], np.uint32))
     result = np.zeros(len(p))
     for dz in (0, 1):
         deep = pcg((z + one * np.uint32(dz)) ^ first)

@@ -26,6 +26,7 @@ from tyndall.sdf.solids import (
     cap,
     ellipsoid_distance,
     length,
+    not_thin,
     rhombus_distance,
     sector,
     triangle_distance,
@@ -82,6 +83,10 @@ class Ellipse(Profile):
 
     code: ClassVar[str] = "ellipse"
     radii: Vec2 = param((1.0, 0.5), SMALLEST, None, "half axes", unit="m")
+
+    def __post_init__(self) -> None:
+        Primitive.__post_init__(self)
+        not_thin(self.radii)
 
     def distance(self, p: Floats) -> Floats:
         return ellipsoid_distance(p * [1, 1, 0], np.array([*self.radii, _FAR]))
@@ -243,9 +248,13 @@ class Trapezoid(Profile):
             raise ParameterError("trapezoid: both sides are 0")
 
     def distance(self, p: Floats) -> Floats:
-        x, y = 0.5 * self.bottom, 0.5 * self.top
-        h = 0.5 * self.height
-        return polygon_distance(p, ((-x, -h), (x, -h), (y, h), (-y, h)))
+        low, high, h = 0.5 * self.bottom, 0.5 * self.top, 0.5 * self.height
+        q = folded(p)  # one half, whose left side is inside and so never nearest
+        w, e = q - [low, -h], np.array([high - low, 2 * h])
+        slope = length(w - e * np.clip(w @ e / (e @ e), 0, 1)[:, None])
+        away, beyond = np.maximum(q[:, 0] - np.where(q[:, 1] < 0, low, high), 0), np.abs(q[:, 1]) - h
+        d = np.minimum(slope, np.hypot(away, beyond))
+        return np.where((e[0] * w[:, 1] > e[1] * w[:, 0]) & (beyond < 0), -d, d)
 
     @property
     def corners(self) -> Box:

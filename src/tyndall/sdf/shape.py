@@ -2,8 +2,8 @@
 
 >>> from tyndall.sdf import box, cylinder, sphere, X
 >>> part = sphere(1) & box(1.5) - cylinder(0.5).orient(X)
->>> part([[0, 0, 0], [2, 0, 0]]).round(3)
-array([0.5, 1.25])
+>>> part([[0, 0, 0], [2, 0, 0]])
+array([0.5 , 1.25])
 
 A shape is a tree of nodes of seven kinds, each a frozen dataclass:
 

@@ -70,8 +70,9 @@ def face(p: Floats, normal: Vec3, out: Vec3, along: Vec3, height: float, apothem
     """Distance from a polyhedron's face in the chamber of one of its edges: the face's normal and height above 0; the
     direction out over the edge and its distance from the face's middle; the direction along the edge and half its
     length."""
-    h, u = p @ np.array(normal) - height, p @ np.array(out) - apothem
-    v = np.maximum(np.abs(p @ np.array(along)) - half, 0)
+    h: Floats = p @ np.array(normal) - height
+    u: Floats = p @ np.array(out) - apothem
+    v: Floats = np.maximum(np.abs(p @ np.array(along)) - half, 0)
     return np.where((h > 0) & (u > 0), np.sqrt(h * h + u * u + v * v), h)
 
 
@@ -79,12 +80,14 @@ def ellipsoid_distance(p: Floats, radii: Floats) -> Floats:
     """Signed distance from an ellipsoid, exact outside and rmin (|p/r| − 1), which is less in size, inside.
 
     Outside, the nearest place is r² p / (t + r²), t the root of 1/|s| = 1, s = r p / (t + r²). That function of t is
-    concave and rises, so Newton's steps from t = 0 never pass the root, and what they leave is a lower bound.
+    concave and rises, so Newton's steps from below the root never pass it, and what they leave is a lower bound. They
+    begin at the greater of what one component alone asks for, and of what a ball of the greatest radius would.
     """
     k = length(p / radii)
     outside = k > 1
-    q = np.where(outside[:, None], p, radii)  # any place that is safe to divide by
-    t = np.zeros(len(p))
+    q = np.where(outside[:, None], np.abs(p), radii)  # any place that is safe to divide by
+    one, ball = (radii * (q - radii)).max(axis=1), length(radii * q) - radii.max() ** 2
+    t = np.maximum(0, np.maximum(one, ball))
     for _ in range(ELLIPSOID_STEPS):
         w = t[:, None] + radii * radii
         s = radii * q / w
@@ -93,7 +96,15 @@ def ellipsoid_distance(p: Floats, radii: Floats) -> Floats:
     return np.where(outside, t * length(q / (t[:, None] + radii * radii)), radii.min() * (k - 1))
 
 
-ELLIPSOID_STEPS = 5
+ELLIPSOID_STEPS = 7  # 1e-5 of the distance for half axes of 1 : 50
+THINNEST = 0.01
+
+
+def not_thin(radii: Sequence[float]) -> None:
+    """Raises:
+    ParameterError: half axes for which these steps are too few."""
+    if min(radii) < THINNEST * max(radii):
+        raise ParameterError("radii: one is less than a hundredth of another; scale a sphere")
 
 
 def bezier_distance(p: Floats, a: Vec2, b: Vec2, c: Vec2) -> Floats:
@@ -173,6 +184,10 @@ class Ellipsoid(Solid):
     code: ClassVar[str] = "ellipsoid"
     id: ClassVar[int | None] = 7
     radii: Vec3 = param((1.0, 0.7, 0.5), SMALLEST, None, "half axes", unit="m")
+
+    def __post_init__(self) -> None:
+        Primitive.__post_init__(self)
+        not_thin(self.radii)
 
     def distance(self, p: Floats) -> Floats:
         return ellipsoid_distance(p, np.array(self.radii))
@@ -316,7 +331,7 @@ class RoundCone(Solid):
         sine = (self.radius_a - self.radius_b) / h
         cosine = math.sqrt(1 - sine * sine)
         k = cosine * y - sine * x
-        between = cosine * x + sine * y - self.radius_a
+        between: Floats = cosine * x + sine * y - self.radius_a
         top = np.hypot(x, y - h) - self.radius_b
         return np.where(k < 0, np.hypot(x, y) - self.radius_a, np.where(k > cosine * h, top, between))
 
@@ -355,10 +370,15 @@ class Vesica(Solid):
 
     @property
     def corners(self) -> Box:
-        # The spindle lies in a cylinder, and in two cones of tangents at its tips; the cylinder will do.
+        # How far it reaches along each axis: to the arc's place in that direction, or to a tip.
         axis = np.subtract(self.b, self.a)
-        wide = self.width * np.sqrt(np.maximum(1 - (axis / np.linalg.norm(axis)) ** 2, 0))
-        return np.minimum(self.a, self.b) - wide, np.maximum(self.a, self.b) + wide
+        r = 0.5 * float(np.linalg.norm(axis))
+        d = 0.5 * (r * r - self.width**2) / self.width
+        along = np.abs(axis) / (2 * r)
+        across = np.sqrt(np.maximum(1 - along**2, 0))
+        reach = np.where((d + self.width) * along < r, d + self.width - d * across, r * along)
+        middle = 0.5 * np.add(self.a, self.b)
+        return middle - reach, middle + reach
 
 
 @dataclass(frozen=True)
