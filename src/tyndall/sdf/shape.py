@@ -247,16 +247,6 @@ class Shape:
         x, y, z = axis
         return repetition.Polar(self, count, (x, y, z))
 
-    # --- describing ---
-
-    def material(self, material: Material) -> Shape:
-        """With this material wherever a part has none of its own."""
-        return Painted(self, material)
-
-    def named(self, name: str) -> Shape:
-        """With a name, by which it can be moved once it is on the device. Several shapes may share a name."""
-        return Named(self, name)
-
     def moved(self, moves: Mapping[str, Iterator[Floats]]) -> Shape:
         """The same with its named parts moved from where they stand, in the space that holds them.
 
@@ -315,6 +305,16 @@ class Shape:
 
         return slices.show_gradient(self, x=x, y=y, z=z, size=size, pixels=pixels)
 
+    # --- describing ---
+
+    def material(self, material: Material) -> Shape:
+        """With this material wherever a part has none of its own."""
+        return Painted(self, material)
+
+    def named(self, name: str) -> Shape:
+        """With a name, by which it can be moved once it is on the device. Several shapes may share a name."""
+        return Named(self, name)
+
 
 def _modified(kind: str, *arguments: Any) -> Shape:
     """A node of a module that imports this one."""
@@ -370,7 +370,6 @@ class Primitive(Shape):
     Attributes:
         code: the name of that function.
         module: the WESL module that it is in.
-        module: the WESL module it is in; ``package::sdf::profiles`` for most flat shapes.
     """
 
     code: ClassVar[str]
@@ -380,8 +379,8 @@ class Primitive(Shape):
     def payload(self) -> NDArray[np.float32] | None:
         """More numbers than 8, (N,), which the function reads from ``implicit_slots`` by fours.
 
-        Where there are any, ``bitcast<u32>(a.x)`` is the index of their first slot on the device, whatever the first
-        of :attr:`numbers` is.
+        Where there are any, ``a.x`` is the index of their first slot on the device, whatever the first of
+        :attr:`numbers` is. The same array of several shapes is there once.
         """
         return None
 
