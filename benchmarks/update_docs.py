@@ -2,7 +2,7 @@
 and the plots of S1's figures into ``docs/images``.
 
 A result is what ``tyndall bench volumetric`` or ``tyndall compare`` saved, ``volumetric.json`` or ``results.json``, or
-what ``benchmarks/rays.py``, ``benchmarks/truth.py`` or ``benchmarks/shadows.py`` printed.
+what ``benchmarks/rays.py``, ``benchmarks/truth.py``, ``benchmarks/shadows.py`` or ``benchmarks/sdf.py`` printed.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any
 
 import ray_tables
 
-from tyndall.lab import bench_shadows_tables
+from tyndall.lab import bench_sdf_tables, bench_shadows_tables
 from tyndall.lab.bench_tables import comparison, markdown, plots, splice
 
 HERE = Path(__file__).parent
@@ -46,6 +46,8 @@ def tables(name: str, document: Any) -> str:
             return markdown(document, f"images/{name}-")
         case "shadows":
             return bench_shadows_tables.markdown(document)
+        case "sdf":
+            return bench_sdf_tables.markdown(document)
         case "rays":
             return ray_tables.rays(document)
         case "truth":

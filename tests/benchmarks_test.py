@@ -8,6 +8,10 @@ from pathlib import Path
 
 import pytest
 
+from tyndall.gpu.device import Gpu
+from tyndall.scene.model import Camera, DirectionalLight, Implicit, Material, Scene
+from tyndall.sdf import box, sphere, union
+
 ROOT = Path(__file__).parents[1]
 RESULTS = sorted((ROOT / "benchmarks" / "results").glob("*.json"))
 
@@ -54,3 +58,31 @@ def test_what_pygfx_is_given_is_the_same_light(monkeypatch: pytest.MonkeyPatch) 
     # sRGB's own fixed points, and its curve at middle grey.
     assert peer["srgb"]((0.0, 1.0)) == pytest.approx((0.0, 1.0))
     assert peer["srgb"]((0.2140,)) == pytest.approx((0.5,), abs=1e-3)
+
+
+def test_what_wgpu_shadertoy_is_given_is_the_same_loop(
+    gpu: Gpu, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """Its text compiles under wgpu-shadertoy's rules; where the package is not, the document says so."""
+    monkeypatch.syspath_prepend(ROOT / "benchmarks")
+    peer = runpy.run_path(str(ROOT / "benchmarks" / "peer_shadertoy.py"))
+    shape = union(sphere(0.5), box(0.6).at(0.5).material(Material(emissive=(1, 2, 3))), smooth=0.1)
+    scene = Scene(
+        lights=(DirectionalLight(),), camera=Camera((0, 1, 3)), ambient=(0.1, 0.2, 0.3), implicits=(Implicit(shape),)
+    )
+    text = peer["shader"](scene, (32, 18))
+    given = """
+        var<private> i_frame: u32;
+        var<private> i_resolution: vec3<f32>;
+        @fragment fn main(@builtin(position) at: vec4f) -> @location(0) vec4f { return shader_main(at.xy); }
+    """
+    gpu.device.create_shader_module(label="toy", code=given + text)
+    assert text.count("@group") == 0
+    monkeypatch.setattr(
+        "sys.argv", ["sdf.py", "--quick", "--peer", "only", "--scenes", "no-such", "--out", str(tmp_path)]
+    )
+    runpy.run_path(str(ROOT / "benchmarks" / "sdf.py"), run_name="__main__")
+    document = json.loads(capsys.readouterr().out)
+    assert "failed" in document["peer"] or document["peer"]["scenes"] == []
+    assert json.loads((tmp_path / "sdf.json").read_text(encoding="utf-8")) == document
+    assert "### Beside wgpu-shadertoy" in (tmp_path / "sdf.md").read_text(encoding="utf-8")

@@ -20,7 +20,9 @@ from PIL import Image
 import tyndall
 from tyndall.app.cli import main
 from tyndall.gpu.params import fields_of
-from tyndall.lab import bench, bench_shadows
+from tyndall.lab import bench, bench_sdf, bench_shadows
+from tyndall.scene.model import Implicit, Scene
+from tyndall.sdf import sphere
 from tyndall.techniques import FAMILIES
 
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
@@ -257,6 +259,21 @@ def test_bench_writes_its_figures_as_json_and_as_tables(
     _, out, err = run(capsys, "bench", "volumetric", "--quick", "--out", "figures", "--json")
     assert json.loads(out) == kept
     assert "12 of 12 points were measured before" in err
+
+
+def test_bench_of_implicit_surfaces_writes_its_figures(
+    capsys: pytest.CaptureFixture[str], folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tiny = dataclasses.replace(bench_sdf.QUICK, parts=("agreement",), agreement=("ball",), points=64)
+    monkeypatch.setattr(bench_sdf, "QUICK", tiny)
+    monkeypatch.setattr(bench_sdf, "open_scene", lambda name: Scene(implicits=(Implicit(sphere()),)))
+    code, out, err = run(capsys, "bench", "sdf", "--quick", "--seconds", "0.5", "--out", "figures")
+    assert code == 0, err
+    assert "### Pruned and whole values" in out
+    document = json.loads((folder / "figures/sdf.json").read_text())
+    assert document["settings"]["seconds"] == 0.5
+    _, out, err = run(capsys, "bench", "sdf", "--quick", "--out", "figures", "--json")
+    assert json.loads(out)["agreement"][0]["still"]["points"] == 64
 
 
 def test_bench_of_shadows_writes_its_figures_and_goes_on(

@@ -18,6 +18,11 @@ LEAVES = {
     "cost_of_lights": [],
     "soft_shadows": ["point.png", "bulb.png", "lantern.png"],
     "sweep_grids": ["sweep"],
+    "model_part": ["part.png"],
+    "field_slices": ["slice.png", "from_above.png", "gradient.png", "star.png"],
+    "mesh_and_field": ["frame.json", "melted.png"],
+    "own_distance": ["urchin.png"],
+    "moving_drops": ["drops.webp"],
 }
 
 

@@ -13,6 +13,7 @@ import tyndall.sdf
 from tyndall.frame import Renderer
 from tyndall.gpu.device import Gpu, GpuError
 from tyndall.gpu.params import fields_of
+from tyndall.lab.baseline import Baseline
 from tyndall.lab.busy import Busy
 from tyndall.lab.truth import TruthSettings, trace
 from tyndall.scene.model import (
@@ -29,6 +30,7 @@ from tyndall.scene.model import (
     Texture,
 )
 from tyndall.sdf import box, sphere, union
+from tyndall.sdf.snippets import Snippet, SnippetSource, evaluate
 from tyndall.techniques import FAMILIES
 from tyndall.techniques.contract import Unsupported
 from tyndall.techniques.shadow.depth_maps import IN_WORDS
@@ -111,6 +113,10 @@ def test_every_entry_point_compiles_and_is_used(gpu: Gpu, monkeypatch: pytest.Mo
         world.move({0: _mirror})
         cast(gpu, world, [[0, 0, 0]], [[0, 0, -1]])
         blocked(gpu, world, [[0, 0, 0]], [[0, 0, -1]])
+    evaluate(gpu, Snippet(SnippetSource("plane", "fn plane(p: vec3f) -> f32 { return p.y; }")), np.zeros((1, 3)))
+    for stage in ("fragment", "compute"):
+        with Baseline(gpu, Scene(implicits=(Implicit(sphere()),)), (8, 6), stage=stage):  # type: ignore[arg-type]
+            pass
     monkeypatch.setattr("tyndall.lab.busy._ROUNDS", 2)
     monkeypatch.setitem(gpu.adapter_info, "adapter_type", "DiscreteGPU")
     with Busy(gpu) as busy:

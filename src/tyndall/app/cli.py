@@ -369,6 +369,29 @@ def shadows(
         print(result.markdown())
 
 
+@bench.command()
+def sdf(
+    *,
+    quick: Annotated[bool, typer.Option("--quick", help="The same in small, for a software adapter.")] = False,
+    seconds: Annotated[
+        float | None,
+        typer.Option(metavar="S", min=0.01, help="How long each of our frames is measured; 30, or 1 with --quick."),
+    ] = None,
+    adapter: AdapterName = None,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the figures and the tables.")] = Path("out/sdf"),
+    as_json: Json = False,
+) -> None:
+    """Implicit surfaces against a plain shader loop: time, edits, first picture, and whether pruning is right."""
+    from tyndall.lab import bench_sdf as figures
+
+    with console.Work("reading", remaining=True) as work:
+        result = figures.sdf(adapter, out, quick=quick, seconds=seconds, progress=work.advance)
+    if as_json:
+        print(json.dumps(result.to_json(), indent=2))
+    else:
+        print(result.markdown())
+
+
 def main(words: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code.
 

@@ -41,7 +41,7 @@ from tyndall.gpu.resources import (
     Texture,
     texel_dtype,
 )
-from tyndall.gpu.shader import Linked, Linker, create_module
+from tyndall.gpu.shader import Linked, Linker, create_module, diagnose
 
 log = logging.getLogger("tyndall")
 
@@ -607,6 +607,10 @@ class Gpu(Closing):
         self.device.queue.read_buffer(fence)
         fence.destroy()
 
+    def check_wgsl(self, text: str) -> tuple[int, int, str] | None:
+        """Line, column (from 1) and message of the first fault that the driver finds in WGSL; None: there is none."""
+        return diagnose(self.device, text)
+
     # --- pipelines ------------------------------------------------------------------------------------------------
 
     def _program(
@@ -639,7 +643,8 @@ class Gpu(Closing):
         text = _bindings_module(names, slots)
         linked = self.linker.link(module, entries, text, overlay, features)
         label = f"{module.removeprefix('package::').replace('::', '/')}.{entries[0]}"
-        native = create_module(self.device, self.linker, linked, label)
+        trusted = not any(slot.untrusted for slot in slots)
+        native = create_module(self.device, self.linker, linked, label, trusted=trusted)
         used = tuple((i, names[i]) for i in sorted(linked.used))
         layout_entries = [slots[i].entry(i) for i, _ in used]
         if state is not None:

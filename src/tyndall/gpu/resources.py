@@ -61,6 +61,8 @@ def texel_dtype(format: str) -> tuple[Any, int]:
 class Slot:
     """How a shader sees a resource: a declaration of ``{name}``, the struct or import that it needs before it, and the
     functions that read and write a resource of several bindings (:class:`Parts`).
+
+    ``untrusted``: its preamble holds code that a user wrote, so what it is linked into is compiled with every check on.
     """
 
     declaration: str
@@ -68,6 +70,7 @@ class Slot:
     visibility: int
     preamble: str = ""
     accessors: str = ""
+    untrusted: bool = False
 
     def __hash__(self) -> int:
         if (known := self.__dict__.get("_hash")) is None:  # a frame looks its pipelines up by their slots
@@ -97,10 +100,14 @@ class Bound:
         """The same, with constants that shaders may import beside it: branches on them cost nothing."""
         return self.telling("\n".join(f"const {name} = {str(value).lower()};" for name, value in constants.items()))
 
-    def telling(self, text: str) -> Bound:
-        """The same, with WESL declarations (and imports, a line each) that shaders may import beside it."""
-        preamble = "\n".join(filter(None, [self.slot.preamble, text]))
-        return Bound(replace(self.slot, preamble=preamble), self.native)
+    def telling(self, text: str, *, untrusted: bool = False) -> Bound:
+        """The same, with WESL declarations (and imports, a line each) that shaders may import beside it.
+
+        Args:
+            untrusted: a user wrote some of it.
+        """
+        preamble = "\n".join([*filter(None, [self.slot.preamble]), text])
+        return Bound(replace(self.slot, preamble=preamble, untrusted=untrusted or self.slot.untrusted), self.native)
 
 
 @dataclass(frozen=True)

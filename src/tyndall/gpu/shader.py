@@ -13,6 +13,7 @@ Errors of the linker and of the driver are reported with file, line and column o
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -34,6 +35,7 @@ _DECLARATION = re.compile(r"(?:fn|struct|const|override|var(?:<[^>]*>)?)\s+(\w+)
 # Line numbers of the driver's report. A fault of grammar has its place in the heading, "┌─ wgsl:4:5"; a fault of
 # meaning names the function there, and underlines what it found, of which the last is the statement that failed.
 _DRIVER_GRAMMAR = re.compile(r"┌─ wgsl:(\d+):\d+$", re.MULTILINE)
+_DRIVER_HEADING = re.compile(r"┌─ wgsl:(\d+):(\d+)$", re.MULTILINE)
 _DRIVER_MARKED = re.compile(r"^\s*(\d+) │.*\n\s*│[ │]*\^", re.MULTILINE)
 _DRIVER_FUNCTION = re.compile(r"┌─ .*:(\d+):\d+$", re.MULTILINE)
 
@@ -183,6 +185,29 @@ def create_module(
         where = linker.locate(linked, int(line)) if line else f"{label}:1:1"
         detail = [line.strip() for line in text.splitlines() if line.strip()]
         raise ShaderError(f"{where}: " + "\n".join(detail)) from None
+
+
+def diagnose(device: wgpu.GPUDevice, wgsl: str) -> tuple[int, int, str] | None:
+    """Line, column (from 1) and message of the first fault that the driver finds in WGSL; None where there is none."""
+    try:
+        device.create_shader_module(label="checked", code=wgsl)
+    except (wgpu.GPUError, RuntimeError) as error:
+        text = str(error)
+        if heading := _DRIVER_HEADING.search(text):
+            place, message = (int(heading[1]), int(heading[2])), re.search(r"parsing error: (.*)", text)
+            marked = re.search(r"\^+ (\S.*)$", text, re.MULTILINE)
+            parts = [message[1] if message else "", marked[1] if marked else ""]
+        else:
+            place = (1, 1)
+            lines = text.splitlines()
+            margin = 2 if "╭" in text else 0  # of a function that is marked as a whole beside what is underlined
+            for above, line in itertools.pairwise(lines):
+                number = re.match(r"\s*(\d+) │ ", above)
+                if number and "^" in line and "╰" not in line:
+                    place = int(number[1]), line.index("^") - number.end() - margin + 1
+            parts = re.findall(r"^\s*= (.*)", text, re.MULTILINE) or text.strip().splitlines()[-1:]
+        return *place, ": ".join(dict.fromkeys(part for part in parts if part)) or "it does not compile"
+    return None
 
 
 def _create_trusted(device: wgpu.GPUDevice, code: str, label: str) -> wgpu.GPUShaderModule | None:

@@ -42,6 +42,10 @@ forgotten: what depends on it is only where samples go, not what they say, so th
 **The unit of light** on the device is the scene's own brightness (:func:`unit_of`), a power of two, so that the squares
 of dim and of bright light alike are within the range of its 32-bit numbers.
 
+**A software adapter** silently ends an invocation's loops after some 65,000 turns, and the march through implicit
+surfaces takes many. So a dispatch gives a pixel few samples there, each invocation says when its loops were ended
+early, and the truth is then traced anew with one sample a dispatch, or refused: it is never silently wrong.
+
 **The error that stops** is :meth:`Truth.relative_error`, of radiance and of in-scattered light alike, summed on the
 device. **The cache** keeps truths by content (scene, size, depth, filter, seed, the code that took part, the versions
 of wgpu and wesl-py, and whether a processor or a GPU draws), under ``$TYNDALL_CACHE/truth``, of the last few versions
@@ -78,6 +82,7 @@ from tyndall.lab.fingerprint import scene_hash
 from tyndall.scene.bundled.cache import directory, version_of
 from tyndall.scene.files.atomic import atomic_write
 from tyndall.scene.model import Scene
+from tyndall.sdf.field import Field
 from tyndall.sdf.paint import materials_of
 from tyndall.tracing.world import World
 
@@ -93,7 +98,8 @@ _WORTH_A_PILOT = 1024  # samples
 _SUBMIT_S = 0.25  # work sent at once: short enough for any driver's watchdog, long enough to fill a device
 _LOOP_LIMIT = 50_000  # iterations that a software adapter runs before it silently cuts an invocation's loops: 2^16
 _VERSIONS = 4  # of the code, whose truths the cache keeps
-_RAY_STEPS = 200  # iterations of a ray, generously
+_RAY_STEPS = 200  # iterations of a ray among triangles, generously
+_MARCH_STEPS, _LISTED = 60, 24  # of a ray through implicit surfaces, and what it runs at each; many need more
 
 Floats = NDArray[np.float32]
 Kind = Literal["radiance", "inscattered"]
@@ -185,7 +191,8 @@ def trace(
         progress: hears a fraction of 1, an estimate.
 
     Raises:
-        GpuError: no adapter, or a picture or scene beyond its limits.
+        GpuError: no adapter, a picture or scene beyond its limits, or rays that march through implicit surfaces for
+            longer than a software adapter lets them.
         ParameterError: no scene, a size that is not in whole pixels, or light beyond the range of 32-bit numbers.
     """
     settings = settings or TruthSettings()
@@ -204,8 +211,12 @@ def trace(
             if progress:
                 progress(1.0)
             return _described(before, settings)
-        with _Tracer(device, scene, size, settings) as tracer:
-            found = _converge(tracer, settings, before, progress)
+        try:
+            with _Tracer(device, scene, size, settings) as tracer:
+                found = _converge(tracer, settings, before, progress)
+        except _CutOff:
+            with _Tracer(device, scene, size, settings, most_samples=1) as tracer:
+                found = _converge(tracer, settings, before, progress)
     finally:
         if gpu is None:
             device.close()
@@ -377,10 +388,31 @@ def _pooled(a: Truth, b: Truth) -> Truth:
 # --- device -------------------------------------------------------------------------------------------------------
 
 
-class _Tracer(Closing):
-    """A scene's rays, and the sums of their light, on a device."""
+class _CutOff(GpuError):
+    """The adapter ended an invocation's loops before they were done."""
 
-    def __init__(self, gpu: Gpu, scene: Scene, size: tuple[int, int], settings: TruthSettings) -> None:
+    def __init__(self) -> None:
+        super().__init__(
+            "truth: rays march for longer through these implicit surfaces than a software adapter lets them"
+        )
+
+
+class _Tracer(Closing):
+    """A scene's rays, and the sums of their light, on a device.
+
+    Args:
+        most_samples: of a pixel in one dispatch; None: by what rays are likely to take.
+    """
+
+    def __init__(
+        self,
+        gpu: Gpu,
+        scene: Scene,
+        size: tuple[int, int],
+        settings: TruthSettings,
+        *,
+        most_samples: int | None = None,
+    ) -> None:
         self._gpu, self.size, self._settings = gpu, size, settings
         self._buffers: list[Buffer] = []
         self._world: World | None = None
@@ -431,7 +463,9 @@ class _Tracer(Closing):
         self._software = gpu.adapter_info["adapter_type"] == "CPU"
         self._budget = 1 << 14 if self._software else 1 << 18
         rays = 1 + 2 * min(len(scene.lights), _MOST_LIGHTS) + 6 * (settings.depth - 2)
-        self._most_samples = max(1, _LOOP_LIMIT // (rays * _RAY_STEPS)) if self._software else 1 << 16
+        steps = _RAY_STEPS + (_marched(self._world.fields) if self._world.fields else 0)
+        likely = max(1, _LOOP_LIMIT // (rays * steps)) if self._software else 1 << 16
+        self._most_samples = most_samples or likely
         self._pending, self._since = 0, time.monotonic()
         self._batches, self._samples, self._most, self._squares = 0, 1.0, 1, 0.0
 
@@ -544,6 +578,8 @@ class _Tracer(Closing):
         self._dispatch("sum_errors", 256 * _GROUPS)
         sums = self._gpu.read_buffer(self._totals).view(np.float32).reshape(-1, 4).sum(axis=0, dtype=np.float64)
         light, air, square, air_square = (float(x) / (3 * self.size[0] * self.size[1]) for x in sums)
+        if light < 0:
+            raise _CutOff
         self._squares = 3 * (square + air_square)  # of an ordinary pixel, all channels
         scale = self._batches * (self._batches - 1)
         unit = self._unit
@@ -559,6 +595,8 @@ class _Tracer(Closing):
         moments = moments.astype(np.float64)
         depth = self._gpu.read_buffer(self._depths).view(np.float32)[: width * height].reshape(height, width)
         surfaces, air = moments[..., 0, :], moments[..., 1, :]
+        if surfaces.min() < 0:
+            raise _CutOff
         scale = 1 / (self._batches * (self._batches - 1))
         errors = [np.sqrt(np.maximum(moments[..., i, :], 0) * scale) for i in (2, 3)]
         with np.errstate(over="ignore"):  # who asked for it is told
@@ -588,6 +626,11 @@ class _Tracer(Closing):
             self._world.close()
             self._world = None
         self._gpu.forget_groups()
+
+
+def _marched(fields: Field) -> int:
+    """Iterations that a ray through implicit surfaces is likely to stay below."""
+    return _MARCH_STEPS * (1 + min(fields.size, _LISTED))
 
 
 # --- cache --------------------------------------------------------------------------------------------------------

@@ -90,21 +90,21 @@ def _vec3(v: Points) -> Vec3:
 
 
 def _points(scene: Scene) -> Points:
-    """(N, 3) points of the surfaces in the world, at most about ``_MOST_POINTS``, spread over all instances; of an
-    implicit surface the corners of its box.
+    """(N, 3) points of the surface in the world: at most about ``_MOST_POINTS``, spread over all instances, and the
+    corners of the boxes of implicit surfaces.
     """
-    boxes = [box_corners(*one.bounds) for one in scene.implicits if one.bounds is not None]
-    if not scene.instances:
-        return np.concatenate(boxes) if boxes else np.array(scene.bounds)
+    parts = [box_corners(*implicit.bounds) for implicit in scene.implicits if implicit.bounds is not None]
+    if not scene.instances and not parts:
+        return box_corners(*scene.bounds)
     total = sum(len(i.mesh.positions) for i in scene.instances)
     step = -(-total // _MOST_POINTS)
-    parts, skipped = [], 0
+    skipped = 0
     for instance in scene.instances:
         chosen = instance.mesh.positions[skipped::step].astype(np.float64)
         skipped = (skipped - len(instance.mesh.positions)) % step
         matrix = np.asarray(instance.transform)
         parts.append(chosen @ matrix[:3, :3].T + matrix[:3, 3])
-    return np.concatenate([*parts, *boxes])
+    return np.concatenate(parts)
 
 
 def _frame(points: Points, centre: Points, radius: float) -> Camera:

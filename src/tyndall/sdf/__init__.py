@@ -8,6 +8,10 @@ array([0.5 , 1.25])
 :mod:`tyndall.sdf.shape` says what a shape is and what can be done to it.
 """
 
+from tyndall.sdf.files import load as load
+from tyndall.sdf.files import save as save
+from tyndall.sdf.grid import Grid as Grid
+from tyndall.sdf.grid import from_mesh as from_mesh
 from tyndall.sdf.profiles import PROFILES as PROFILES
 from tyndall.sdf.profiles import arc as arc
 from tyndall.sdf.profiles import bar as bar
@@ -39,6 +43,8 @@ from tyndall.sdf.profiles import star as star
 from tyndall.sdf.profiles import trapezoid as trapezoid
 from tyndall.sdf.profiles import triangle as triangle
 from tyndall.sdf.profiles import uneven_capsule as uneven_capsule
+from tyndall.sdf.shading import FragmentShader as FragmentShader
+from tyndall.sdf.shading import ShadedMaterial as ShadedMaterial
 from tyndall.sdf.shape import Shape as Shape
 from tyndall.sdf.shape import X as X
 from tyndall.sdf.shape import Y as Y
@@ -46,6 +52,8 @@ from tyndall.sdf.shape import Z as Z
 from tyndall.sdf.shape import intersection as intersection
 from tyndall.sdf.shape import subtraction as subtraction
 from tyndall.sdf.shape import union as union
+from tyndall.sdf.snippets import SnippetError as SnippetError
+from tyndall.sdf.snippets import snippet as snippet
 from tyndall.sdf.solids import SOLIDS as SOLIDS
 from tyndall.sdf.solids import box as box
 from tyndall.sdf.solids import box_frame as box_frame

@@ -33,6 +33,7 @@ from tyndall.scene.model import Implicit
 from tyndall.sdf.marching import Marching
 from tyndall.sdf.program import Kinds, Program, compile_shape
 from tyndall.sdf.shape import Box, Floats
+from tyndall.sdf.snippets import validate
 
 OWNER = "implicit"
 _OBJECT = "package::sdf::objects::ImplicitObject"
@@ -89,6 +90,7 @@ class Field(Closing):
     Raises:
         ParameterError: a shape that has no program.
         GpuError: more than the device holds.
+        SnippetError: a user's code that does not compile.
     """
 
     def __init__(
@@ -137,6 +139,8 @@ class Field(Closing):
             words, slots = words + program.size, slots + len(program.slots)
             materials += 1 + len(program.materials)
             cells, entries = cells + made.cells, entries + made.capacity
+        for source in self._kinds.sources():
+            validate(gpu, source)
         for made in self._objects:
             made.first_entry += words
         self._words = np.concatenate([np.zeros((0, 2), np.uint32), *(self._placed_words(o) for o in self._objects)])
@@ -206,7 +210,7 @@ class Field(Closing):
         text = "\n".join([*(f"const {name} = {n}u;" for name, n in constants.items()), self._kinds.wesl()])
         assert self._params is not None
         return {
-            "implicit_objects": self._object_buffer.read().telling(text),
+            "implicit_objects": self._object_buffer.read().telling(text, untrusted=not self.is_trusted),
             "implicit_slots": self._slot_buffer.read(),
             "implicit_lists": self._list_buffer.read(),
             "implicit_cells": self._cell_buffer.read(),

@@ -18,6 +18,7 @@ box of the analysis, which may be wider.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 
 import numpy as np
@@ -70,7 +71,9 @@ def to_mesh(
     values, origin = _sample(solid, low, high, step, cells)
     if not (values < 0).any():
         raise ParameterError(f"resolution: no sample at {resolution} is inside the shape; it is thinner than a cell")
-    vertices, triangles, _, _ = marching_cubes(values, 0.0, gradient_direction="descent")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # scikit-image 0.26 with numpy 2.5
+        vertices, triangles, _, _ = marching_cubes(values, 0.0, gradient_direction="descent")  # type: ignore[no-untyped-call]
     places = refine(solid, origin + vertices.astype(np.float64) * step, step)
     positions, indices = places.astype(np.float32), triangles.astype(np.uint32)
     normals = gradient(solid, places, 1e-3 * step)
@@ -163,7 +166,7 @@ def _sample(shape: Shape, low: Floats, high: Floats, step: float, cells: NDArray
     filled = np.where(value < 0, -1.0, 1.0).reshape(blocks)
     for axis in range(3):
         filled = filled.repeat(coarse, axis=axis)
-    filled = np.pad(filled, [(0, 1)] * 3, mode="edge")
+    filled = np.pad(filled, [(0, 1)] * 3, constant_values=1.0)  # the last layer is outside
     first = first[np.abs(value) <= reach * coarse]
     parts = np.argwhere(np.ones([coarse // fine] * 3, bool)) * fine
     first = (first[:, None] + parts).reshape(-1, 3)

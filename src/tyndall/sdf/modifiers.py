@@ -329,7 +329,7 @@ class Turning(Modifier):
 
     @cached_property
     def accuracy(self) -> Accuracy:
-        return "bound" if self.rate else weakest(self.shape.accuracy)
+        return "bound"  # also unturned: beyond the cylinder the value is less than the distance
 
 
 @dataclass(frozen=True)

@@ -25,8 +25,8 @@ Slots, in vec4f; ``k`` is the width of a smooth join, ``L`` the Lipschitz bound 
   (factor, L, −, −)``.
 
 A leaf that only unions lie above has a *margin* ≥ 0, others −1: where its value is above that of the whole by more than
-the margin, it does not matter. A smooth union of width k is at least a − k − k/4 where both of its values matter, so the
-margin is the sum of 5/4 k over the unions above (and what takes its place for the other blends).
+the margin, it does not matter. A smooth union of width k is at least a − k where a still matters, so the margin is the sum of k over
+the unions above (and what takes its place for the other blends).
 
 Affine transforms are multiplied into the leaves below, except around what changes places by itself and around parts
 with a name, which move as one.
@@ -88,11 +88,15 @@ class Kinds:
             self.version += 1
         return known[key][0]
 
+    def sources(self) -> list[Any]:
+        """The texts among them that a user wrote (:class:`~tyndall.sdf.snippets.SnippetSource`)."""
+        shapes: list[Any] = [shape for _, shape in (*self._primitives.values(), *self._modifiers.values())]
+        return [shape.source for shape in shapes if getattr(shape, "untrusted", False)]
+
     @property
     def is_trusted(self) -> bool:
         """Whether none of them is a user's code."""
-        shapes = [shape for _, shape in (*self._primitives.values(), *self._modifiers.values())]
-        return not any(getattr(shape, "untrusted", False) for shape in shapes)
+        return not self.sources()
 
     def wesl(self) -> str:
         """Text for the bindings module: ``implicit_primitive``, its numbers in the slots or given, ``implicit_enter`` and
@@ -416,7 +420,7 @@ class _Compiler:
             self._emit(shapes[0], c, join, blend, k)
             return
         if c.margin >= 0:
-            c = replace(c, margin=c.margin + width * (25.0 if kind == EXPONENTIAL else 1.25))
+            c = replace(c, margin=c.margin + width * (25.0 if kind == EXPONENTIAL else 1.0))
         # Pairing from the left gives a first half of a power of two.
         half = 1 << (len(shapes) - 1).bit_length() - 1
         self._pairs(shapes[:half], c, inner, kind, width, PUSH, HARD, 0.0)

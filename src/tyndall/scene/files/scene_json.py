@@ -11,6 +11,7 @@ JSON with the old geometry. Binary files that no JSON refers to any more are lef
 from __future__ import annotations
 
 import hashlib
+import importlib
 import json
 import math
 import re
@@ -25,10 +26,18 @@ from tyndall.gpu.params import ParameterError, fields_of
 from tyndall.scene.errors import SceneError
 from tyndall.scene.files.atomic import atomic_write
 from tyndall.scene.files.source import beside, map_bytes
-from tyndall.scene.model import Image, Instance, Material, Mesh, Scene, Texture
+from tyndall.scene.model import Image, Implicit, Instance, Material, Mesh, Scene, Texture
 
 VERSION = 1
+# Who knows the JSON of implicit surfaces: a module with `pack`, `unpack` and `load_scene`, above this layer, that is
+# imported where a file has any.
+IMPLICITS = "tyndall.sdf.files"
 _ALIGN = 16  # bytes; any view of the mapped file is aligned for its type and for vector loads
+
+
+def codec() -> Any:
+    """The module that reads and writes implicit surfaces."""
+    return importlib.import_module(IMPLICITS)
 
 
 # --- writing ------------------------------------------------------------------------------------------------------
@@ -147,6 +156,11 @@ def save(scene: Scene, path: Path) -> None:
         **writer.tables,
         "instances": instances,
     }
+    if scene.implicits:
+        try:
+            record["implicits"] = codec().pack(scene.implicits)
+        except ParameterError as error:
+            raise SceneError(path, str(error)) from error
     wrong: list[str] = []
     plain = _plain(record, "", wrong)
     if wrong:
@@ -209,8 +223,17 @@ def load(path: Path) -> Scene:
         raise SceneError(path, f"not JSON: {error}") from error
     if not isinstance(data, dict):
         raise SceneError(path, "not a scene: a JSON object is expected")
+    if "version" not in data and ("scene" in data or "model" in data):
+        implicit: Scene = codec().load_scene(path)
+        return implicit
 
     wrong: list[str] = []
+    implicits: tuple[Implicit, ...] = ()
+    if data.get("implicits") is not None:
+        try:
+            implicits = codec().unpack(path, data["implicits"], raw.decode("utf-8"))
+        except SceneError as error:
+            wrong += error.mistakes
     binary: NDArray[np.uint8] | None = None
     if isinstance(data.get("data"), str):
         try:
@@ -233,7 +256,7 @@ def load(path: Path) -> Scene:
         wrong += schema.mistakes(error, data)
     if wrong:
         raise SceneError(path, wrong)
-    return _build(path, record, np.zeros(0, np.uint8) if binary is None else binary)
+    return _build(path, record, np.zeros(0, np.uint8) if binary is None else binary).with_(implicits=implicits)
 
 
 def _not_finite(value: Any, loc: tuple[Any, ...]) -> list[tuple[str, float]]:

@@ -254,6 +254,7 @@ class SceneRecord(Record):
     materials: tuple[_MaterialRecord, ...] = ()
     meshes: tuple[MeshRecord, ...] = ()
     instances: tuple[InstanceRecord, ...] = ()
+    implicits: dict[str, Any] | None = pydantic.Field(None, description="implicit surfaces; see docs/sdf-json.md")
 
 
 @cache

@@ -1,0 +1,79 @@
+"""The benchmark of implicit surfaces, and wgpu-shadertoy on the same scenes, in one run. Prints one JSON document.
+
+    python benchmarks/sdf.py [--quick] [--seconds 5] [--parts scenes,swarm] [--scenes snail] [--swarm 10,1000]
+                             [--peer only|none] [--out DIR]
+
+It is what ``tyndall bench sdf`` measures, with wgpu-shadertoy's whole frames under ``peer`` (see
+``peer_shadertoy.py``). The document and its tables are also saved in ``--out``, or else in the folder that ``$OUT``
+names: ``sdf.json`` and ``sdf.md``; the document grows there as figures come.
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import json
+import os
+import sys
+import time
+from pathlib import Path
+
+import peer_shadertoy
+
+from tyndall.gpu.device import Gpu
+from tyndall.lab import bench_sdf
+from tyndall.lab.bench_sdf import SdfBench
+from tyndall.lab.scenes import open_scene
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="the same in small")
+    parser.add_argument("--seconds", type=float, help="of each measurement of our frames")
+    parser.add_argument("--loop-seconds", type=float, help="of each measurement of the plain loop")
+    parser.add_argument("--timeout", type=float, help="seconds after which a compiler is ended")
+    parser.add_argument("--parts", help=f"some of {','.join(bench_sdf.PARTS)}")
+    parser.add_argument("--scenes", help="names, comma-separated")
+    parser.add_argument("--swarm", help="numbers of primitives, comma-separated")
+    parser.add_argument("--size", help="WxH")
+    parser.add_argument("--peer", choices=("too", "only", "none"), default="too")
+    parser.add_argument("--out", type=Path, default=os.environ.get("OUT"))
+    chosen = parser.parse_args()
+    base = bench_sdf.QUICK if chosen.quick else bench_sdf.Settings()
+    changes: dict[str, object] = {
+        "parts": () if chosen.peer == "only" else tuple(chosen.parts.split(",")) if chosen.parts else None,
+        "scenes": tuple(chosen.scenes.split(",")) if chosen.scenes else None,
+        "swarm": tuple(int(count) for count in chosen.swarm.split(",")) if chosen.swarm else None,
+        "size": tuple(int(side) for side in chosen.size.split("x")) if chosen.size else None,
+        "seconds": chosen.seconds,
+        "loop_seconds": chosen.loop_seconds or (min(chosen.seconds, base.loop_seconds) if chosen.seconds else None),
+        "timeout": chosen.timeout,
+    }
+    settings = dataclasses.replace(base, **{k: v for k, v in changes.items() if v is not None})  # type: ignore[arg-type]
+    begin = time.monotonic()
+
+    def tell(fraction: float, text: str) -> None:
+        print(f"{time.monotonic() - begin:6.1f} s  {100 * fraction:3.0f} %  {text}", file=sys.stderr, flush=True)
+
+    with Gpu() as gpu:
+        found = bench_sdf.sdf(gpu, chosen.out, settings=settings, progress=tell)
+    document = found.to_json()
+    if chosen.peer != "none":
+        scenes = {}
+        for name in settings.scenes:
+            try:
+                scenes[name] = open_scene(name)
+            except Exception as fault:  # told as what it is
+                tell(1.0, f"{name}: {fault}")
+        document["peer"] = peer_shadertoy.measure(
+            scenes, settings.size, seconds=settings.loop_seconds, progress=lambda text: tell(1.0, text)
+        )
+    document["seconds"] = round(time.monotonic() - begin, 1)
+    whole = SdfBench(document)
+    if chosen.out:
+        whole.save(chosen.out)
+    print(json.dumps(document, indent=1, ensure_ascii=False))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,500 @@
+"""The benchmark of implicit surfaces, beside the same scenes as one plain loop in one shader.
+
+``tyndall bench sdf`` measures, on one adapter and in one run:
+
+- **scenes**: ``portrait``, ``snail``, ``jumper`` and ``temple`` with shadows and ambient occlusion at 1920×1080, still
+  and in motion, for half a minute each: frames per second, GPU time by pass, host time; beside them the plain loop as a
+  fragment and as a compute shader (:mod:`tyndall.lab.baseline`), and S5's own numbers (:mod:`tyndall.lab.s5`);
+- **swarm**: 10 to 10,000 smooth-blended primitives, still and all moving, beside the loop as literal code, which cannot
+  move, and as a loop over an array, which can;
+- **edits**: host time to move a leaf, all leaves, or an object, among 10,000 primitives, and the bytes written for it;
+- **first**: the first picture in a process of its own, without and with what the driver keeps of earlier ones'
+  pipelines, and in a program that draws already;
+- **agreement**: pruned cells against whole programs at a million random points, also after a move.
+
+Ours is the time of the whole frame: G-buffer, shadows, ambient occlusion, lighting, composite and tone mapping, in
+buffers that meshes, air and antialiasing share. The loop's is that of its one pass. Frames are drawn one at a time and
+timed by the GPU; "frames per second" are those that a program draws which waits after each batch of
+:data:`BATCH`, with the host's work in them.
+
+What cannot be measured is written down with its reason, and the others go on; with a folder, the document is saved
+after each figure. ``quick`` measures the same things in small.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import os
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from datetime import date
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tyndall.frame import Renderer
+from tyndall.gpu.device import Gpu, GpuError
+from tyndall.gpu.params import ParameterError, nearest
+from tyndall.lab import bench_sdf_tables as tables
+from tyndall.lab import s5
+from tyndall.lab.busy import Busy
+from tyndall.lab.field_check import agreement
+from tyndall.lab.fingerprint import scene_hash, versions
+from tyndall.lab.first_picture import Order, in_a_process, run
+from tyndall.lab.measure import Times, measure
+from tyndall.lab.picture import check_folder, write_texts
+from tyndall.lab.scenes import open_scene
+from tyndall.lab.stage import adapter_name, driver_name
+from tyndall.scene.model import Scene
+from tyndall.sdf import sphere, union
+from tyndall.sdf.field import Field
+from tyndall.techniques import FAMILIES
+
+NAME = "sdf"
+PARTS = ("scenes", "swarm", "edits", "first", "agreement")
+FRAME: Mapping[str, str] = {
+    "volumetric": "off",
+    "shadow": "field",
+    "occlusion": "field_ao",
+    "antialiasing": "none",
+    "tonemap": "aces",
+}
+BATCH = 8  # frames between two waits, where frames per second are counted
+STEP = 1 / 60  # s of a scene's own time from frame to frame
+_MOST_LITERAL = 2000  # primitives; a compiler has no end with more
+
+Progress = Callable[[float, str], object]
+Row = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What is measured. The defaults are S5's settings and more; :data:`QUICK` is the same in small.
+
+    Attributes:
+        seconds: of each of our frames' measurements; the plain loop gets at most ``loop_seconds``.
+        timeout: seconds after which a process that has no picture is ended.
+        processes: whether first pictures and literal code get processes of their own.
+    """
+
+    parts: tuple[str, ...] = PARTS
+    size: tuple[int, int] = s5.SIZE
+    scenes: tuple[str, ...] = tuple(s5.FPS)
+    swarm: tuple[int, ...] = (10, 100, 1_000, 10_000)
+    edited: int = 10_000
+    first: tuple[str, ...] = ("swarm:1000", "temple")
+    agreement: tuple[str, ...] = (*s5.FPS, "swarm:1000")
+    points: int = 1_000_000
+    seconds: float = float(s5.SECONDS)
+    loop_seconds: float = 5.0
+    frames: int = 100_000
+    edits: int = 50
+    timeout: float = 90.0
+    processes: bool = True
+
+
+QUICK = Settings(
+    size=(160, 90),
+    swarm=(10, 100),
+    edited=100,
+    first=("swarm:100",),
+    agreement=("snail", "swarm:100"),
+    points=20_000,
+    seconds=1.0,
+    loop_seconds=1.0,
+    frames=5,
+    edits=5,
+)
+
+
+@dataclass(frozen=True)
+class SdfBench:
+    """The figures of one run, as plain data (:meth:`to_json`) and as tables (:meth:`markdown`)."""
+
+    document: Mapping[str, Any]
+
+    def to_json(self) -> dict[str, Any]:
+        """Ready for ``json.dumps``."""
+        return dict(self.document)
+
+    def markdown(self) -> str:
+        """All tables, as they stand in ``docs/benchmarks.md``."""
+        return tables.markdown(self.document)
+
+    def __str__(self) -> str:
+        return self.markdown()
+
+    def save(self, folder: str | os.PathLike[str]) -> Path:
+        """Write ``sdf.json`` and ``sdf.md``.
+
+        Raises:
+            OutputError: ``folder`` is a file, or the system refuses.
+        """
+        target = Path(folder)
+        text = json.dumps(self.document, indent=1, ensure_ascii=False) + "\n"
+        write_texts(target, {f"{NAME}.json": text, f"{NAME}.md": self.markdown()})
+        return target
+
+
+def sdf(
+    adapter: str | Gpu | None = None,
+    out: str | os.PathLike[str] | None = None,
+    *,
+    quick: bool = False,
+    seconds: float | None = None,
+    settings: Settings | None = None,
+    progress: Progress | None = None,
+) -> SdfBench:
+    """Measure everything that the module lists.
+
+    Args:
+        adapter: part of an adapter's name, or a device to share.
+        out: folder for the document, as it grows, and the tables.
+        quick: :data:`QUICK` instead of S5's settings.
+        seconds: of each measurement of our frames, in place of the settings' own.
+        settings: others than these two.
+        progress: hears a fraction of 1 and what is being measured.
+
+    Raises:
+        GpuError: no such adapter, or one that cannot time what it draws.
+        ParameterError: no such part.
+        OutputError: ``out`` cannot be written.
+    """
+    chosen = settings or (QUICK if quick else Settings())
+    if seconds is not None:
+        chosen = dataclasses.replace(chosen, seconds=seconds, loop_seconds=min(seconds, chosen.loop_seconds))
+    for part in chosen.parts:
+        if part not in PARTS:
+            raise ParameterError(f"parts: no part '{part}'{nearest(part, PARTS)} (there are {', '.join(PARTS)})")
+    if out is not None:
+        check_folder(Path(out))
+    own = not isinstance(adapter, Gpu)
+    gpu = adapter if isinstance(adapter, Gpu) else Gpu(adapter)
+    try:
+        if "timestamp-query" not in gpu.features:
+            raise GpuError("this adapter cannot time what it draws (timestamp-query), and a benchmark is of times")
+        work = _Run(gpu, chosen, Path(out) if out is not None else None, progress)
+        work.all()
+    finally:
+        if own:
+            gpu.close()
+    bench = SdfBench(work.document)
+    if out is not None:
+        bench.save(out)
+    return bench
+
+
+class _Moving:
+    """A renderer whose scene's own time goes on from frame to frame."""
+
+    def __init__(self, renderer: Renderer) -> None:
+        self._renderer, self._time = renderer, 0.0
+
+    def draw(self) -> float:
+        self._time += STEP
+        return self._renderer.draw(time=self._time)
+
+    def timings(self) -> dict[str, float]:
+        return self._renderer.timings()
+
+    def memory(self) -> dict[str, int]:
+        return self._renderer.memory()
+
+
+class _Run:
+    """The figures, one after another."""
+
+    def __init__(self, gpu: Gpu, settings: Settings, out: Path | None, progress: Progress | None) -> None:
+        self._gpu, self._s, self._out = gpu, settings, out
+        self._progress = progress or (lambda fraction, text: None)
+        self._done, self._planned = 0, self._count()
+        self.document: dict[str, Any] = {
+            "benchmark": NAME,
+            "date": date.today().isoformat(),
+            "adapter": adapter_name(gpu),
+            "adapter_type": gpu.adapter_info["adapter_type"],
+            "driver": driver_name(gpu),
+            "versions": versions(),
+            "settings": {
+                "size": list(settings.size),
+                "seconds": settings.seconds,
+                "loop_seconds": settings.loop_seconds,
+                "frame": dict(FRAME),
+            },
+            "scenes": [],
+        }
+
+    def _count(self) -> int:
+        s = self._s
+        sizes = {
+            "scenes": 3 * len(s.scenes),
+            "swarm": 5 * len(s.swarm),
+            "edits": 1,
+            "first": len(s.first),
+            "agreement": len(s.agreement),
+        }
+        return max(1, sum(sizes[part] for part in s.parts))
+
+    def all(self) -> None:
+        """Every part."""
+        for part in self._s.parts:
+            getattr(self, f"_{part}")()
+
+    # --- parts --------------------------------------------------------------------------------------------------------
+
+    def _scenes(self) -> None:
+        for name in self._s.scenes:
+            row: Row = {"scene": name}
+            scene = self._tried(name, partial(open_scene, name))
+            if scene is None:
+                continue
+            row |= facts(scene)
+            self.document["scenes"].append(row)
+            self._ours(name, scene, row)
+            for stage in ("fragment", "compute"):
+                self._loop(f"{name}, {stage}", row.setdefault("loop", {}), stage, Order(name, stage), scene)
+
+    def _swarm(self) -> None:
+        rows = self.document.setdefault("swarm", [])
+        for count in self._s.swarm:
+            name = f"swarm:{count}"
+            scene = self._tried(name, partial(open_scene, name))
+            if scene is None:
+                continue
+            row: Row = {"scene": name, "count": count, **facts(scene)}
+            rows.append(row)
+            self._ours(name, scene, row)
+            for stage in ("fragment", "compute"):
+                key, order = row.setdefault("listed", {}), Order(name, stage, loops=True)
+                self._loop(f"{name} as a list, {stage}", key, stage, order, scene, isolated=False)
+                key, order = row.setdefault("loop", {}), Order(name, stage)
+                if count <= _MOST_LITERAL:
+                    self._loop(f"{name} as code, {stage}", key, stage, order, scene)
+                else:
+                    key[stage] = {"failed": f"not tried: {count:,} primitives as code"}
+                    self._step(f"{name} as code")
+
+    def _ours(self, name: str, scene: Scene, row: Row) -> None:
+        def found() -> Row:
+            figures: Row = {}
+            with Renderer(scene, self._s.size, gpu=self._gpu, **techniques()) as renderer:  # type: ignore[arg-type]
+                figures["still"] = self._measured(renderer, renderer)
+                figures["memory"] = renderer.memory()
+                figures["uploaded_still"] = renderer.uploaded
+                if getattr(scene, "motion", None) is not None:
+                    figures["moving"] = self._measured(renderer, _Moving(renderer))
+                    figures["uploaded_moving"] = renderer.uploaded
+            return figures
+
+        self._step(name)
+        row["ours"] = self._tried(name, found) or {"failed": self._reason}
+        self._save()
+
+    def _measured(self, renderer: Renderer, drawn: Any) -> Row:
+        gpu, s = self._gpu, self._s
+        with Busy(gpu) as busy:
+            taken = measure(drawn, frames=s.frames, warmup=8, budget_s=s.seconds, before=busy)
+        fps = frames_per_second(drawn.draw, gpu.wait, min(s.seconds, 3.0), s.frames)
+        frame = taken.frame or Times(0.0, 0.0, 0.0)
+        return {
+            "frame_ms": frame.to_json(),
+            "host_ms": taken.host.to_json(),
+            "passes": {n: round(t.median, 6) for n, t in taken.passes.items() if n != "frame"},
+            "fps": round(fps, 2),
+            "frames": taken.frames,
+        }
+
+    def _loop(
+        self, text: str, into: Row, stage: str, order: Order, scene: Scene, *, isolated: bool | None = None
+    ) -> None:
+        s = self._s
+        apart = s.processes if isolated is None else isolated
+        order = dataclasses.replace(
+            order, size=s.size, seconds=s.loop_seconds, frames=s.frames, adapter=self.document["adapter"]
+        )
+
+        def found() -> Row:
+            if apart:
+                return in_a_process(order, timeout=s.timeout, keep_compiled=False)
+            return run(order, self._gpu, scene)
+
+        self._step(text)
+        into[stage] = self._tried(text, found) or {"failed": self._reason}
+        self._save()
+
+    def _edits(self) -> None:
+        name = f"swarm:{self._s.edited}"
+        self._step(f"edits of {name}")
+        found = self._tried(name, lambda: self._edited(name))
+        self.document["edits"] = found or {"scene": name, "failed": self._reason}
+        self._save()
+
+    def _edited(self, name: str) -> Row:
+        """Host times of edits, each with the frame that shows it."""
+        scene, s = open_scene(name), self._s
+        index = largest(scene)
+        one = scene.implicits[index]
+        shape: Any = one.shape
+        low, high = shape.box
+        place = tuple(float(x) for x in (low + high) / 2)
+        leaf = sphere(0.02 * float((high - low).max())).named("the one").at(*place)
+        joined = dataclasses.replace(one, shape=union(shape, leaf, smooth=0.0), name="the object")
+        implicits = tuple(joined if i == index else other for i, other in enumerate(scene.implicits))
+        scene = scene.with_(implicits=implicits)
+        motion: Any = getattr(scene, "motion", None)
+        rows: dict[str, Row] = {}
+        with Renderer(scene, s.size, gpu=self._gpu, **techniques()) as renderer:  # type: ignore[arg-type]
+            renderer.draw()
+            self._gpu.wait()
+            turns = [np.eye(4) for _ in range(s.edits)]
+            for i, turn in enumerate(turns):
+                turn[:3, 3] = 0.001 * i, 0, 0
+            placement = np.asarray(joined.transform)
+            rows["nothing"] = self._edit(renderer, [lambda: None] * s.edits)
+            rows["a leaf"] = self._edit(renderer, [partial(renderer.move, "the one", t) for t in turns])
+            places = [t @ placement for t in turns]
+            rows["the object"] = self._edit(renderer, [partial(renderer.place, "the object", p) for p in places])
+            if motion is not None:
+                given = [motion(STEP * i) for i in range(s.edits)]
+                rows["all leaves"] = self._edit(renderer, [partial(_move_all, renderer, g) for g in given])
+                begin = time.perf_counter()
+                for i in range(s.edits):
+                    motion(STEP * i)
+                rows["the scene's own motion"] = {
+                    "edit_ms": Times.of([(time.perf_counter() - begin) * 1e3 / s.edits]).to_json()
+                }
+        return {"scene": name, **facts(scene), "rows": rows}
+
+    def _edit(self, renderer: Renderer, edits: list[Callable[[], object]]) -> Row:
+        calls, draws, gpu_ms = [], [], []
+        uploaded = 0
+        for edit in edits:
+            begin = time.perf_counter()
+            edit()
+            calls.append((time.perf_counter() - begin) * 1e3)
+            draws.append(renderer.draw())
+            uploaded = renderer.uploaded
+            gpu_ms.append(renderer.timings().get("frame", 0.0))
+        return {
+            "edit_ms": Times.of(calls).to_json(),
+            "draw_ms": Times.of(draws).to_json(),
+            "frame_ms": Times.of(gpu_ms).to_json(),
+            "uploaded": uploaded,
+        }
+
+    def _first(self) -> None:
+        rows = self.document.setdefault("first", [])
+        for name in self._s.first:
+            self._step(f"first picture of {name}")
+            order = Order(name, size=self._s.size, adapter=self.document["adapter"], techniques=techniques())
+            scene = self._tried(name, partial(open_scene, name))
+            if scene is None:
+                continue
+            row: Row = {"scene": name, **facts(scene)}
+            rows.append(row)
+            for kind, keep in (("new", False), ("kept", True), ("kept", True)):  # what is kept must be made first
+                if self._s.processes:
+                    row[kind] = in_a_process(order, timeout=self._s.timeout, keep_compiled=keep)
+            found = self._tried(name, partial(run, order, self._gpu, scene))
+            row["running"] = found or {"failed": self._reason}
+            self._save()
+
+    def _agreement(self) -> None:
+        rows = self.document.setdefault("agreement", [])
+        for name in self._s.agreement:
+            self._step(f"agreement in {name}")
+            found = self._tried(name, partial(self._agreed, name))
+            rows.append(found or {"scene": name, "failed": self._reason})
+            self._save()
+
+    def _agreed(self, name: str) -> Row:
+        scene, gpu = open_scene(name), self._gpu
+        motion: Any = getattr(scene, "motion", None)
+        with Field(gpu, scene.implicits) as field:
+            still = agreement(gpu, field, scene.implicits, self._s.points)
+            row: Row = {"scene": name, **facts(scene), "still": still.to_json()}
+            used, kept = field.counters().sum(axis=0)
+            row["cells"] = {"entries": int(used), "overflows": int(kept)}
+            if motion is not None:
+                at = scene.at_time(1.25)
+                for part, matrices in motion(1.25).items():
+                    move_any(field, scene, part, matrices)
+                row["moved"] = agreement(gpu, field, at.implicits, self._s.points, seed=1).to_json()
+        return row
+
+    # --- how it goes --------------------------------------------------------------------------------------------------
+
+    def _step(self, text: str) -> None:
+        self._progress(self._done / self._planned, text)
+        self._done = min(self._done + 1, self._planned)
+
+    def _tried[T](self, what: str, work: Callable[[], T]) -> T | None:
+        """The work's result; None where it failed, for a reason that is then kept."""
+        self._reason = ""
+        try:
+            return work()
+        except Exception as fault:
+            self._gpu.discard()
+            self._reason = f"{type(fault).__name__}: {fault}".splitlines()[0]
+            self.document.setdefault("failed", []).append({"what": what, "reason": self._reason})
+            return None
+
+    def _save(self) -> None:
+        if self._out is not None:
+            text = json.dumps(self.document, indent=1, ensure_ascii=False) + "\n"
+            write_texts(self._out, {f"{NAME}.json": text})
+
+
+def _move_all(renderer: Renderer, moves: Mapping[str, Any]) -> None:
+    for name, matrices in moves.items():
+        renderer.move(name, matrices)
+
+
+def techniques() -> dict[str, str]:
+    """Those of our frame, by family."""
+    instead = {"field": "shadow_map", "field_ao": "none"}
+    return {family: name if name in FAMILIES[family].members else instead[name] for family, name in FRAME.items()}
+
+
+def facts(scene: Scene) -> Row:
+    """What a scene is, for a row."""
+    shapes: list[Any] = [implicit.shape for implicit in scene.implicits]
+    return {
+        "scene_hash": scene_hash(scene),
+        "objects": len(shapes),
+        "nodes": sum(shape.count for shape in shapes),
+        "lights": len(scene.lights),
+    }
+
+
+def largest(scene: Scene) -> int:
+    """The number of the object of the most nodes."""
+    shapes: list[Any] = [implicit.shape for implicit in scene.implicits]
+    return max(range(len(shapes)), key=lambda i: shapes[i].count)
+
+
+def move_any(field: Field, scene: Scene, name: str, matrices: Any) -> None:
+    """Move what a scene's motion names: an object, or parts."""
+    for index, implicit in enumerate(scene.implicits):
+        if implicit.name == name:
+            field.place(index, np.asarray(matrices) @ np.asarray(implicit.transform))
+            return
+    field.move(name, matrices)
+
+
+def frames_per_second(
+    draw: Callable[[], object], wait: Callable[[], object], seconds: float, frames: int = 1_000_000
+) -> float:
+    """Frames that a program draws in a second which waits for the device after each batch of :data:`BATCH`."""
+    begin = time.perf_counter()
+    drawn = 0
+    while drawn < 2 or (time.perf_counter() - begin < seconds and drawn < frames):
+        for _ in range(min(BATCH, max(1, frames - drawn))):
+            draw()
+            drawn += 1
+        wait()
+    return drawn / (time.perf_counter() - begin)

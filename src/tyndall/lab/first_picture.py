@@ -1,0 +1,160 @@
+"""How soon a scene of implicit surfaces shows its first picture, and what its frames take then: a process of its own.
+
+    python -m tyndall.lab.first_picture '{"scene": "swarm:1000", "who": "ours"}'
+
+It prints one line of JSON. A compiler that takes minutes can be ended from outside this way, and nothing is warm but
+what the driver keeps on disk.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+_BEGIN = time.perf_counter()
+
+import tyndall  # noqa: E402
+from tyndall.frame import Renderer  # noqa: E402
+from tyndall.gpu.device import Gpu  # noqa: E402
+from tyndall.lab.baseline import Baseline, Loop  # noqa: E402
+from tyndall.lab.busy import Busy  # noqa: E402
+from tyndall.lab.measure import Times, measure  # noqa: E402
+from tyndall.lab.scenes import open_scene  # noqa: E402
+from tyndall.scene.model import Scene  # noqa: E402
+
+SLOW_MS = 1500.0  # a frame of the plain loop that would take longer is measured smaller
+_SMALLER = 4  # as wide and high
+
+
+@dataclass(frozen=True)
+class Order:
+    """What is drawn.
+
+    Attributes:
+        who: "ours", or the plain loop as "fragment" or "compute".
+        loops: whether unions of very many leaves are lists that the plain loop runs over; otherwise all is code.
+        seconds: of measuring frames; 0: the first picture alone.
+        techniques: of our frame, by family.
+    """
+
+    scene: str
+    who: str = "ours"
+    loops: bool = False
+    size: tuple[int, int] = (1920, 1080)
+    seconds: float = 0.0
+    frames: int = 100_000
+    adapter: str | None = None
+    techniques: Mapping[str, str] | None = None
+
+
+def run(order: Order, gpu: Gpu | None = None, scene: Scene | None = None) -> dict[str, Any]:
+    """Draw the first picture, a second first one on the same device, and frames.
+
+    Returns:
+        ``first_ms``: from a scene and a device to a picture; ``compile_ms`` of it for the plain loop; ``warm_ms``: the
+        same again, with pipelines that the device has; ``device_ms`` and ``import_ms`` before it, where the process
+        begins with them; ``frame_ms``.
+    """
+    size = (int(order.size[0]), int(order.size[1]))
+    made = gpu is None
+    begin = time.perf_counter()
+    device = gpu or Gpu(order.adapter)
+    found: dict[str, Any] = {}
+    try:
+        if made:
+            device.wait()
+            found["device_ms"] = _since(begin)
+        begin = time.perf_counter()
+        described = scene or open_scene(order.scene)
+        found["scene_ms"] = _since(begin)
+        for name in ("first_ms", "warm_ms"):
+            begin = time.perf_counter()
+            with _make(order, device, described, size) as drawn:
+                drawn.draw()
+                device.wait()
+                found[name] = _since(begin)
+                if name == "first_ms" and isinstance(drawn, Baseline):
+                    found["compile_ms"] = round(drawn.compile_ms, 3)
+                if name == "warm_ms" and order.seconds > 0:
+                    found |= frames_of(order, device, described, drawn)
+    finally:
+        if made:
+            device.close()
+    return found
+
+
+def _make(order: Order, gpu: Gpu, scene: Scene, size: tuple[int, int], settings: Loop | None = None) -> Any:
+    if order.who == "ours":
+        chosen: dict[str, Any] = dict(order.techniques or {})
+        return Renderer(scene, size, gpu=gpu, **chosen)
+    stage: Any = order.who
+    return Baseline(gpu, scene, size, stage=stage, moving=order.loops, settings=settings)
+
+
+def frames_of(order: Order, gpu: Gpu, scene: Scene, drawn: Any) -> dict[str, Any]:
+    """The time of frames; of the plain loop where a frame would take very long, of a smaller picture, by its pixels."""
+    size = (int(order.size[0]), int(order.size[1]))
+    if order.who == "ours":
+        return _measured(order, gpu, drawn)
+    small = (max(1, size[0] // _SMALLER), max(1, size[1] // _SMALLER))
+    settings = Loop.of(scene, size)  # with the large picture's cones
+    with _make(order, gpu, scene, small, settings) as probe:
+        for _ in range(2):
+            probe.draw()
+            taken = probe.timings().get("frame", 0.0)
+        share = size[0] * size[1] / (small[0] * small[1])
+        if taken * share > SLOW_MS:
+            found = _measured(order, gpu, probe)
+            scaled = {key: value * share for key, value in found["frame_ms"].items()}
+            return {**found, "frame_ms": scaled, "measured_size": list(small)}
+    return _measured(order, gpu, drawn)
+
+
+def _measured(order: Order, gpu: Gpu, drawn: Any) -> dict[str, Any]:
+    with Busy(gpu) as busy:
+        taken = measure(drawn, frames=order.frames, warmup=3, budget_s=order.seconds, before=busy)
+    frame = taken.frame or Times(0.0, 0.0, 0.0)
+    return {"frame_ms": frame.to_json(), "host_ms": taken.host.to_json(), "frames": taken.frames}
+
+
+def _since(begin: float) -> float:
+    return round((time.perf_counter() - begin) * 1e3, 3)
+
+
+def in_a_process(order: Order, *, timeout: float = 120.0, keep_compiled: bool = True) -> dict[str, Any]:
+    """:func:`run` in a process of its own, with ``process_ms``, its whole life as seen from outside.
+
+    Args:
+        timeout: seconds, after which it is ended; the result is then ``{"failed": …}``.
+        keep_compiled: whether the driver may use what it keeps on disk of earlier processes' pipelines (NVIDIA, Mesa).
+    """
+    environment = dict(os.environ)
+    environment["PYTHONPATH"] = os.pathsep.join(
+        [str(Path(tyndall.__file__).parents[1]), *filter(None, [environment.get("PYTHONPATH")])]
+    )
+    if not keep_compiled:
+        environment |= {"__GL_SHADER_DISK_CACHE": "0", "MESA_SHADER_CACHE_DISABLE": "true"}
+    begin = time.perf_counter()
+    words = [sys.executable, "-m", "tyndall.lab.first_picture", json.dumps(asdict(order))]
+    try:
+        done = subprocess.run(words, capture_output=True, text=True, env=environment, timeout=timeout, check=False)
+    except subprocess.TimeoutExpired:
+        return {"failed": f"no picture within {timeout:g} s", "timeout_s": timeout}
+    lines = done.stdout.strip().splitlines()
+    if done.returncode or not lines:
+        said = done.stderr.strip().splitlines()
+        return {"failed": said[-1] if said else f"it ended with {done.returncode}"}
+    found: dict[str, Any] = json.loads(lines[-1])
+    return {**found, "process_ms": _since(begin)}
+
+
+if __name__ == "__main__":
+    imported = _since(_BEGIN)
+    print(json.dumps({"import_ms": imported, **run(Order(**json.loads(sys.argv[1])))}))
