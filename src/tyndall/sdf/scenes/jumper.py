@@ -55,9 +55,11 @@ def _ear(side: int) -> Shape:
     """From its root upwards and outwards; the tip flops."""
     outer = [(0, 0, 0), _side(0.06, 0.3, -0.02, side), _side(0.2, 0.58, -0.05, side), _side(0.44, 0.62, -0.02, side)]
     inner = [
-        _side(0.01, 0.1, 0.06, side), _side(0.065, 0.3, 0.055, side), _side(0.19, 0.53, 0.04, side),
+        _side(0.01, 0.1, 0.06, side),
+        _side(0.065, 0.3, 0.055, side),
+        _side(0.19, 0.53, 0.04, side),
         _side(0.38, 0.575, 0.05, side),
-    ]  # fmt: skip
+    ]
     return union(
         union(*strand(outer, (0.1, 0.125, 0.13, 0.07), 4), smooth=0.05).material(FUR),
         union(*strand(inner, (0.05, 0.075, 0.08, 0.035), 3), smooth=0.04).material(PINK),
@@ -88,11 +90,15 @@ def _face(side: int) -> list[Shape]:
         egg(_side(0.165, 1.215, 0.395, side), (0.078, 0.098, 0.06), spin(-8, 20 * side)).material(DARK),
         ball(_side(0.165, 1.255, 0.452, side) if side > 0 else (-0.125, 1.255, 0.452), 0.024).material(SHINE),
         egg(_side(0.3, 1.07, 0.335, side), (0.085, 0.055, 0.05), spin(0, 40 * side)).material(PINK),
-        union(*strand(
-            [_side(0.1, 1.385, 0.385, side), _side(0.165, 1.405, 0.385, side), _side(0.235, 1.37, 0.355, side)],
-            (0.016, 0.022, 0.014), 2,
-        ), smooth=0.01).material(DARK),
-    ]  # fmt: skip
+        union(
+            *strand(
+                [_side(0.1, 1.385, 0.385, side), _side(0.165, 1.405, 0.385, side), _side(0.235, 1.37, 0.355, side)],
+                (0.016, 0.022, 0.014),
+                2,
+            ),
+            smooth=0.01,
+        ).material(DARK),
+    ]
 
 
 def _trunk() -> Shape:
@@ -116,13 +122,18 @@ def _trunk() -> Shape:
         smooth=0.03,
     )
     tail = union(
-        *(s.material(SCARF) for s in strand(
-            [(-0.2, 0.86, -0.28), (-0.42, 1.02, -0.5), (-0.62, 1.28, -0.58), (-0.86, 1.4, -0.66)], (0.07, 0.085, 0.1), 4
-        )),
+        *(
+            s.material(SCARF)
+            for s in strand(
+                [(-0.2, 0.86, -0.28), (-0.42, 1.02, -0.5), (-0.62, 1.28, -0.58), (-0.86, 1.4, -0.66)],
+                (0.07, 0.085, 0.1),
+                4,
+            )
+        ),
         *(s.material(FRINGE) for s in strand([(-0.86, 1.4, -0.66), (-1.0, 1.44, -0.68)], (0.1, 0.09), 1)),
         ball((-0.2, 0.87, -0.27), 0.1).material(SCARF),
         smooth=0.03,
-    )  # fmt: skip
+    )
     features = [
         *_face(1),
         *_face(-1),
@@ -228,8 +239,15 @@ def _toadstool(at: tuple[float, float, float], size: float) -> Shape:
     cap = egg((0, 0.5, 0), (0.36, 0.27, 0.36)) - egg((0, 0.33, 0), (0.42, 0.18, 0.42))
     dots = [
         egg((0.35 * math.cos(a) * c, 0.5 + 0.262 * s, 0.35 * math.sin(a) * c), (0.06, 0.045, 0.06))
-        for a, c, s in ((0.4, 0.75, 0.66), (1.7, 0.8, 0.6), (2.9, 0.72, 0.69), (4.1, 0.8, 0.6), (5.3, 0.75, 0.66), (1.1, 0.2, 0.98))
-    ]  # fmt: skip
+        for a, c, s in (
+            (0.4, 0.75, 0.66),
+            (1.7, 0.8, 0.6),
+            (2.9, 0.72, 0.69),
+            (4.1, 0.8, 0.6),
+            (5.3, 0.75, 0.66),
+            (1.1, 0.2, 0.98),
+        )
+    ]
     stem = union(*strand([(0, -0.1, 0), (0.02, 0.2, 0), (0, 0.48, 0)], (0.14, 0.1, 0.09), 2), smooth=0.04)
     return union(cap.material(CAP), *(d.material(STEM) for d in dots), stem.material(STEM)).scale(size).at(*at)
 
@@ -288,7 +306,14 @@ def _props(random: np.random.Generator) -> Shape:
 
 
 def _cloud(at: tuple[float, float, float], size: float) -> Shape:
-    puffs = [((0, 0, 0), 0.8), ((-0.9, -0.15, 0.1), 0.6), ((0.95, -0.1, 0), 0.65), ((0.4, 0.45, -0.1), 0.6), ((1.6, -0.25, 0.1), 0.4), ((-1.55, -0.25, 0), 0.4)]  # fmt: skip
+    puffs = [
+        ((0, 0, 0), 0.8),
+        ((-0.9, -0.15, 0.1), 0.6),
+        ((0.95, -0.1, 0), 0.65),
+        ((0.4, 0.45, -0.1), 0.6),
+        ((1.6, -0.25, 0.1), 0.4),
+        ((-1.55, -0.25, 0), 0.4),
+    ]
     return union(*(ball(p, r) for p, r in puffs), smooth=0.3).scale((size, 0.8 * size, 0.8 * size)).at(*at)
 
 

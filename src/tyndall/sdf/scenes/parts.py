@@ -12,6 +12,8 @@ from tyndall.scene.model import Mat4, Material, Vec3
 from tyndall.sdf.shape import Floats, Shape
 from tyndall.sdf.solids import ellipsoid, round_cone, sphere
 
+Place = Sequence[float] | Floats
+
 
 def paint(color: str, roughness: float = 0.8, metallic: float = 0.0, glow: float = 0.0) -> Material:
     """A material of an sRGB colour ``#rrggbb``; ``glow`` is the radiance that it emits in its own colour."""
@@ -20,12 +22,12 @@ def paint(color: str, roughness: float = 0.8, metallic: float = 0.0, glow: float
     return Material(color, (r, g, b, 1.0), metallic, roughness, (glow * r, glow * g, glow * b))
 
 
-def ball(place: Sequence[float], radius: float) -> Shape:
+def ball(place: Place, radius: float) -> Shape:
     """A sphere at a place."""
     return sphere(radius).at(*place)
 
 
-def egg(place: Sequence[float], radii: Vec3, turn: ArrayLike | None = None) -> Shape:
+def egg(place: Place, radii: Vec3, turn: ArrayLike | None = None) -> Shape:
     """An ellipsoid at a place, turned before by a 4×4 rotation."""
     shape: Shape = ellipsoid(radii)
     if turn is not None:
@@ -47,7 +49,7 @@ def _triple(v: Floats) -> Vec3:
     return (float(v[0]), float(v[1]), float(v[2]))
 
 
-def curve(points: ArrayLike, count: int) -> NDArray[np.float64]:
+def curve(points: ArrayLike | Sequence[Place], count: int) -> NDArray[np.float64]:
     """(count, D) places on a curve through (N, D) points, evenly in its parameter (Catmull and Rom 1974)."""
     p = np.asarray(points, np.float64)
     p = np.concatenate([[2 * p[0] - p[1]], p, [2 * p[-1] - p[-2]]])
@@ -55,10 +57,10 @@ def curve(points: ArrayLike, count: int) -> NDArray[np.float64]:
     i = np.minimum(t.astype(int), len(p) - 4)
     u = (t - i)[:, None]
     a, b, c, d = (p[i + k] for k in range(4))
-    return 0.5 * (2 * b + (c - a) * u + (2 * a - 5 * b + 4 * c - d) * u**2 + (3 * b - a - 3 * c + d) * u**3)
+    return np.asarray(0.5 * (2 * b + (c - a) * u + (2 * a - 5 * b + 4 * c - d) * u**2 + (3 * b - a - 3 * c + d) * u**3))
 
 
-def strand(points: ArrayLike, radii: Sequence[float], pieces: int) -> list[Shape]:
+def strand(points: ArrayLike | Sequence[Place], radii: Sequence[float], pieces: int) -> list[Shape]:
     """Limbs along a curve through (N, 3) points whose radii are given at both ends and evenly between."""
     p = np.asarray(points, np.float64)
     places = curve(p, pieces + 1)
@@ -75,7 +77,7 @@ def spin(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Floats:
     return np.asarray(about_z @ about_y @ about_x, np.float64)
 
 
-def about(place: Sequence[float], turn: Floats) -> Floats:
+def about(place: Place, turn: Floats) -> Floats:
     """4×4 of a turn about a place instead of 0."""
     to, back = np.eye(4), np.eye(4)
     to[:3, 3], back[:3, 3] = place, np.negative(place)

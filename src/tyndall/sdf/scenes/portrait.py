@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tyndall.scene.bundled.sunlight import Options, suns
-from tyndall.scene.model import Camera, Implicit, Material, Scene
+from tyndall.scene.model import Camera, Implicit, Scene
 from tyndall.sdf.scenes.parts import about, ball, curve, egg, limb, paint, rows, spin, strand
 from tyndall.sdf.shape import Floats, Shape, intersection, subtraction, union
 from tyndall.sdf.solids import box, cylinder, sphere, torus
@@ -80,8 +80,9 @@ def _lips() -> Shape:
         upper += strand([(side * x, y, z) for x, y, z in path], (0.014, 0.037, 0.044, 0.034), 4)
     lower = strand(
         [(-0.265, -0.595, 0.75), (-0.12, -0.68, 0.85), (0, -0.705, 0.872), (0.12, -0.68, 0.85), (0.265, -0.595, 0.75)],
-        (0.012, 0.046, 0.058, 0.046, 0.012), 6,
-    )  # fmt: skip
+        (0.012, 0.046, 0.058, 0.046, 0.012),
+        6,
+    )
     return union(union(*upper, smooth=0.03), union(*lower, smooth=0.03)).material(LIPS)
 
 
@@ -153,14 +154,21 @@ def _ornament() -> Shape:
     """Flowers and leaves on the right of the head."""
     parts: list[Shape] = []
     for (x, y, z), color, size in (
-        ((-0.93, 0.62, 0.42), 0, 1.7), ((-0.72, 1.0, 0.42), 1, 1.3), ((-1.08, 0.28, 0.3), 1, 1.3),
-        ((-0.68, 0.8, 0.68), 2, 1.05), ((-1.1, 0.62, 0.05), 2, 1.2), ((-0.92, 1.02, 0.1), 0, 1.2),
-    ):  # fmt: skip
+        ((-0.93, 0.62, 0.42), 0, 1.7),
+        ((-0.72, 1.0, 0.42), 1, 1.3),
+        ((-1.08, 0.28, 0.3), 1, 1.3),
+        ((-0.68, 0.8, 0.68), 2, 1.05),
+        ((-1.1, 0.62, 0.05), 2, 1.2),
+        ((-0.92, 1.02, 0.1), 0, 1.2),
+    ):
         parts.append(_flower(color, size).orient((x, y - 0.3, z + 0.25)).at(x * 1.13, y * 1.08, z * 1.1))
     for x, y, z, turn in (
-        (-0.72, 1.22, 0.24, 40), (-1.13, 0.0, 0.3, -60), (-1.16, 0.45, -0.05, 10), (-0.86, 0.42, 0.72, 100),
+        (-0.72, 1.22, 0.24, 40),
+        (-1.13, 0.0, 0.3, -60),
+        (-1.16, 0.45, -0.05, 10),
+        (-0.86, 0.42, 0.72, 100),
         (-0.5, 1.05, 0.68, 140),
-    ):  # fmt: skip
+    ):
         parts.append(egg((x * 1.04, y, z), (0.21, 0.035, 0.085), spin(20, turn, turn)).material(SPRIG))
     return union(*parts)
 
@@ -205,7 +213,12 @@ def _hair() -> Shape:
         a = math.radians(198 + 18 * k)
         x, z = 0.95 * math.cos(a), 0.85 * math.sin(a) - 0.2
         wave = 0.09 * (1 if k % 2 else -1)
-        path = [(x, 0.1, z), (1.1 * x + wave, -0.7, 1.1 * z), (1.05 * x - wave, -1.35, 1.12 * z - 0.05), (1.15 * x + wave, -1.95, 1.25 * z)]  # fmt: skip
+        path = [
+            (x, 0.1, z),
+            (1.1 * x + wave, -0.7, 1.1 * z),
+            (1.05 * x - wave, -1.35, 1.12 * z - 0.05),
+            (1.15 * x + wave, -1.95, 1.25 * z),
+        ]
         locks.append(_lock(path, (0.22, 0.24, 0.2, 0.07), 5, k))
     # A loose curl before each ear.
     for side in (-1, 1):
@@ -227,10 +240,15 @@ def _braid() -> Shape:
         side = 1 if i % 2 else -1
         size = 0.23 - 0.006 * i
         beads.append(
-            egg(p + [0.085 * side, 0, 0.02], (0.85 * size, 1.15 * size, size), spin(0, 0, 32 * side)).material(HAIR[i % 4])
-        )  # fmt: skip
+            egg(p + [0.085 * side, 0, 0.02], (0.85 * size, 1.15 * size, size), spin(0, 0, 32 * side)).material(
+                HAIR[i % 4]
+            )
+        )
     tie = torus(0.1, 0.05).orient((0.1, 1, -0.2)).at(*(spine[-1] + [0, -0.17, 0.03])).material(SCARF[0])
-    tuft = [limb(spine[-1] + [0, -0.2, 0.03], spine[-1] + [x, -0.55, 0.03 + z], 0.09, 0.02) for x, z in ((-0.1, 0), (0.02, 0.07), (0.12, 0))]  # fmt: skip
+    tuft = [
+        limb(spine[-1] + [0, -0.2, 0.03], spine[-1] + [x, -0.55, 0.03 + z], 0.09, 0.02)
+        for x, z in ((-0.1, 0), (0.02, 0.07), (0.12, 0))
+    ]
     return union(union(*beads, smooth=0.03), tie, union(*tuft, smooth=0.04).material(HAIR[1]))
 
 
@@ -266,7 +284,12 @@ def head() -> Shape:
 
 
 def _body() -> Shape:
-    neck = union(limb((0, -0.75, -0.2), (0, -2.1, -0.3), 0.4, 0.46), limb((0.3, -1.1, 0.0), (0.08, -1.95, 0.15), 0.1), limb((-0.3, -1.1, 0.0), (-0.08, -1.95, 0.15), 0.1), smooth=0.12)  # fmt: skip
+    neck = union(
+        limb((0, -0.75, -0.2), (0, -2.1, -0.3), 0.4, 0.46),
+        limb((0.3, -1.1, 0.0), (0.08, -1.95, 0.15), 0.1),
+        limb((-0.3, -1.1, 0.0), (-0.08, -1.95, 0.15), 0.1),
+        smooth=0.12,
+    )
     coat = union(
         egg((0, -3.25, -0.35), (1.55, 1.25, 0.8)),
         limb((-1.25, -2.75, -0.4), (1.25, -2.75, -0.4), 0.5),
@@ -298,8 +321,12 @@ def _scarf() -> Shape:
             high = y - slope * z * major
             if z > -0.4:
                 ribs.append(
-                    limb((out * x, high - 0.13, out * z - 0.22), ((out - 0.03) * x, high + 0.13, (out - 0.03) * z - 0.22), 0.035)
-                )  # fmt: skip
+                    limb(
+                        (out * x, high - 0.13, out * z - 0.22),
+                        ((out - 0.03) * x, high + 0.13, (out - 0.03) * z - 0.22),
+                        0.035,
+                    )
+                )
     tail = strand(
         [(-0.42, -2.05, 0.5), (-0.52, -2.6, 0.68), (-0.5, -3.2, 0.72), (-0.58, -3.9, 0.72)], (0.24, 0.27, 0.29), 6
     )

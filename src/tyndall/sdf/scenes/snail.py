@@ -71,7 +71,7 @@ def whorl(turn: ArrayLike) -> tuple[Floats, Floats, Floats]:
 
 def _shell() -> Shape:
     turns = np.linspace(0, TURNS, round(TURNS * PIECES) + 1)
-    centres, radii, out = whorl(turns)
+    centres, radii, _ = whorl(turns)
     tube: list[Shape] = []
     for i in range(len(turns) - 1):
         shade = min(len(BANDS) - 1, int(len(BANDS) * (1 - turns[i] / TURNS)))
@@ -84,8 +84,9 @@ def _shell() -> Shape:
         way = math.cos(lift) * outward + math.sin(lift) * np.array([0, 0, 1.0])
         places = middle + (0.955 * radius)[:, None] * way
         stripes += [
-            limb(places[i], places[i + 1], float(size * radius[i] / 0.43), float(size * radius[i + 1] / 0.43)) for i in range(len(along) - 1)
-        ]  # fmt: skip
+            limb(places[i], places[i + 1], float(size * radius[i] / 0.43), float(size * radius[i + 1] / 0.43))
+            for i in range(len(along) - 1)
+        ]
     mouth, wide, _ = whorl([0.0])
     forward = (math.sin(0.95), math.cos(0.95), 0.0)
     lip = torus(float(wide[0]) * 0.97, 0.075).orient(forward).at(*mouth[0]).material(LIP)
@@ -96,15 +97,23 @@ def _shell() -> Shape:
 def _skin(random: np.random.Generator) -> Shape:
     """Foot, neck and head; the sole is at about y = 0."""
     foot = [
-        *strand([(-3.05, 0.1, -0.1), (-2.2, 0.22, 0.0), (-1.0, 0.4, 0.04), (0.6, 0.42, 0.0), (1.7, 0.42, 0.02)], (0.05, 0.2, 0.42, 0.5, 0.42), 8),
-        *strand([(1.2, 0.4, 0.02), (2.0, 0.62, 0.02), (2.42, 1.05, 0.04), (2.72, 1.35, 0.06)], (0.46, 0.43, 0.37, 0.33), 5),
+        *strand(
+            [(-3.05, 0.1, -0.1), (-2.2, 0.22, 0.0), (-1.0, 0.4, 0.04), (0.6, 0.42, 0.0), (1.7, 0.42, 0.02)],
+            (0.05, 0.2, 0.42, 0.5, 0.42),
+            8,
+        ),
+        *strand(
+            [(1.2, 0.4, 0.02), (2.0, 0.62, 0.02), (2.42, 1.05, 0.04), (2.72, 1.35, 0.06)], (0.46, 0.43, 0.37, 0.33), 5
+        ),
         egg((0.35, 0.75, 0.02), (0.95, 0.5, 0.5)),
         egg((2.83, 1.38, 0.07), (0.42, 0.34, 0.34), spin(0, 0, 14)),
-    ]  # fmt: skip
+    ]
     muzzle = [egg((3.06, 1.22, 0.2), (0.17, 0.15, 0.15)), egg((3.06, 1.22, -0.06), (0.17, 0.15, 0.15))]
     skirt = []
     for side in (-1, 1):
-        edge = curve([(-2.7, 0.05, side * 0.1), (-1.4, 0.05, side * 0.5), (0.3, 0.05, side * 0.68), (1.7, 0.05, side * 0.5)], 10)  # fmt: skip
+        edge = curve(
+            [(-2.7, 0.05, side * 0.1), (-1.4, 0.05, side * 0.5), (0.3, 0.05, side * 0.68), (1.7, 0.05, side * 0.5)], 10
+        )
         skirt += [egg(p, (0.3, 0.12, 0.2)) for p in edge]
     warts = []
     spine = curve([(0.95, 0.62, 0.02), (1.6, 0.68, 0.02), (2.1, 0.9, 0.03), (2.45, 1.2, 0.05)], 9)
@@ -112,8 +121,11 @@ def _skin(random: np.random.Generator) -> Shape:
         for side in (-1, 1):
             angle = random.uniform(0.25, 1.25) * side
             warts.append(
-                ball(p + 0.37 * np.array([-0.25 * (i > 4), 0.35 * math.cos(angle), math.sin(angle)]), random.uniform(0.06, 0.1))
-            )  # fmt: skip
+                ball(
+                    p + 0.37 * np.array([-0.25 * (i > 4), 0.35 * math.cos(angle), math.sin(angle)]),
+                    random.uniform(0.06, 0.1),
+                )
+            )
     body = union(*foot, smooth=0.22).material(SKIN)
     return union(
         body,
@@ -129,7 +141,7 @@ EYES = {"left eye": (2.86, 1.6, -0.14), "right eye": (2.82, 1.6, 0.28)}
 
 def _stalk(side: int) -> Shape:
     top = np.array([0.28 + 0.2 * side, 1.06 - 0.1 * side, 0.24 * side])
-    stalk = strand([(0, -0.1, 0), 0.3 * top + [0, 0.08, 0], 0.7 * top + [-0.02, 0.03, 0], top], (0.13, 0.085, 0.085), 4)
+    stalk = strand([np.array([0, -0.1, 0]), 0.3 * top + [0, 0.08, 0], 0.7 * top + [-0.02, 0.03, 0], top], (0.13, 0.085, 0.085), 4)
     knob = egg(top + [0.02, 0.05, 0], (0.155, 0.165, 0.155))
     pupil = ball(top + [0.07, 0.07, 0.06], 0.115)
     shine = ball(top + [0.1, 0.14, 0.15], 0.03)
@@ -230,9 +242,10 @@ def _toadstool(at: Sequence[float], size: float, lean: float) -> Shape:
 def _fallen_leaf() -> Shape:
     """A pointed leaf, a little bent: what two balls have in common, with its veins."""
     blade = intersection(
-        egg((0, 0, 0.62), (1.75, 0.9, 1.25)), egg((0, 0, -0.62), (1.75, 0.9, 1.25)),
+        egg((0, 0, 0.62), (1.75, 0.9, 1.25)),
+        egg((0, 0, -0.62), (1.75, 0.9, 1.25)),
         ball((0, -4.0, 0), 4.06),
-    ) - ball((0, -4.0, 0), 4.0)  # fmt: skip
+    ) - ball((0, -4.0, 0), 4.0)
     ribs = strand(
         [(-1.9, -0.35, 0), (-0.8, 0.0, 0), (0, 0.07, 0), (0.8, 0.0, 0), (1.4, -0.18, 0)], (0.05, 0.04, 0.02), 6
     )
@@ -254,8 +267,15 @@ def _grass(random: np.random.Generator) -> Shape:
         lean, turn = random.uniform(0.3, 0.9) * tall, random.uniform(0, 2 * math.pi)
         foot = np.array([x, _top(x, z) - 0.15, z])
         way = np.array([math.cos(turn), 0, 0.4 * math.sin(turn)])
-        path = [foot, foot + [0, 0.55 * tall, 0] + 0.2 * lean * way, foot + [0, 0.9 * tall, 0] + 0.6 * lean * way, foot + [0, tall, 0] + 1.1 * lean * way]  # fmt: skip
-        blades.append(union(*strand(path, (0.075, 0.065, 0.05, 0.012), 5), smooth=0.02).material((GREEN, GREEN_DARK)[k % 2]))  # fmt: skip
+        path = [
+            foot,
+            foot + [0, 0.55 * tall, 0] + 0.2 * lean * way,
+            foot + [0, 0.9 * tall, 0] + 0.6 * lean * way,
+            foot + [0, tall, 0] + 1.1 * lean * way,
+        ]
+        blades.append(
+            union(*strand(path, (0.075, 0.065, 0.05, 0.012), 5), smooth=0.02).material((GREEN, GREEN_DARK)[k % 2])
+        )
     return union(*blades)
 
 
@@ -263,7 +283,11 @@ def _clover(at: Sequence[float], size: float, turn: float) -> Shape:
     stem = strand([(0, -0.1, 0), (0.05, 0.4, 0), (0, 0.8, 0.03)], (0.035, 0.028), 3)
     leaves = []
     for k in range(3):
-        heart = union(egg((0.24, 0, 0.11), (0.22, 0.035, 0.16), spin(0, 18)), egg((0.24, 0, -0.11), (0.22, 0.035, 0.16), spin(0, -18)), smooth=0.02)  # fmt: skip
+        heart = union(
+            egg((0.24, 0, 0.11), (0.22, 0.035, 0.16), spin(0, 18)),
+            egg((0.24, 0, -0.11), (0.22, 0.035, 0.16), spin(0, -18)),
+            smooth=0.02,
+        )
         leaves.append(heart.transform(spin(0, 120.0 * k, 14)))
     top = union(*leaves).transform(spin(16)).at(0, 0.8, 0.03)
     return union(union(*stem).material(GREEN_DARK), top.material(GREEN)).transform(spin(0, turn)).scale(size).at(*at)

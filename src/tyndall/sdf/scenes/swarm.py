@@ -30,8 +30,21 @@ WAVE = 0.16  # m, how far each moves
 HEIGHT = 1.45  # m, of the knot's middle above the floor
 COLORS = tuple(
     paint(c, 0.28)
-    for c in ("#24306e", "#3c2f86", "#6a2f93", "#a0338c", "#cf4471", "#ea6a4f", "#f39a44", "#f7c95c", "#f6e7b0", "#9fd6c4", "#3fa0a8", "#256a94")
-)  # fmt: skip
+    for c in (
+        "#24306e",
+        "#3c2f86",
+        "#6a2f93",
+        "#a0338c",
+        "#cf4471",
+        "#ea6a4f",
+        "#f39a44",
+        "#f7c95c",
+        "#f6e7b0",
+        "#9fd6c4",
+        "#3fa0a8",
+        "#256a94",
+    )
+)
 FLOOR = paint("#39405a", 0.6)
 
 
@@ -56,9 +69,12 @@ def morton(places: Floats, low: ArrayLike, high: ArrayLike) -> NDArray[np.uint64
     unit = (places - np.asarray(low)) / np.subtract(high, low)
     cell = np.clip(unit * 2**21, 0, 2**21 - 1).astype(np.uint64)
     for shift, mask in (
-        (32, 0x1F00000000FFFF), (16, 0x1F0000FF0000FF), (8, 0x100F00F00F00F00F),
-        (4, 0x10C30C30C30C30C3), (2, 0x1249249249249249),
-    ):  # fmt: skip
+        (32, 0x1F00000000FFFF),
+        (16, 0x1F0000FF0000FF),
+        (8, 0x100F00F00F00F00F),
+        (4, 0x10C30C30C30C30C3),
+        (2, 0x1249249249249249),
+    ):
         cell = (cell | (cell << np.uint64(shift))) & np.uint64(mask)
     x, y, z = cell.T
     return np.asarray(x | (y << np.uint64(1)) | (z << np.uint64(2)))

@@ -170,9 +170,13 @@ def _gable(z: float, front: bool) -> list[Shape]:
     length = half / math.cos(SLOPE)
     field = intersection(
         block((-half, y, z - 0.35), (half, y + rise, z + 0.05)),
-        box((2 * length, 4, 1)).rotate(SLOPE).at(-half / 2 - 2 * math.sin(SLOPE) * -1, y + rise / 2 - 2 * math.cos(SLOPE), z),
-        box((2 * length, 4, 1)).rotate(-SLOPE).at(half / 2 - 2 * math.sin(SLOPE), y + rise / 2 - 2 * math.cos(SLOPE), z),
-    )  # fmt: skip
+        box((2 * length, 4, 1))
+        .rotate(SLOPE)
+        .at(-half / 2 - 2 * math.sin(SLOPE) * -1, y + rise / 2 - 2 * math.cos(SLOPE), z),
+        box((2 * length, 4, 1))
+        .rotate(-SLOPE)
+        .at(half / 2 - 2 * math.sin(SLOPE), y + rise / 2 - 2 * math.cos(SLOPE), z),
+    )
     parts = [field.material(SHADED)]
     for side in (-1, 1):
         place = (side * half / 2, y + rise / 2 + 0.12, z + 0.12)
@@ -201,8 +205,12 @@ def _relief() -> Shape:
         ]
         parts.append(union(*body, smooth=0.1))
         parts.append(
-            union(egg((side * 3.75, -0.5, 0), (0.2, 0.24, 0.16)), limb((side * 3.75, -0.4, 0), (side * 3.75, -0.1, 0), 0.07, 0.09), smooth=0.06)
-        )  # fmt: skip
+            union(
+                egg((side * 3.75, -0.5, 0), (0.2, 0.24, 0.16)),
+                limb((side * 3.75, -0.4, 0), (side * 3.75, -0.1, 0), 0.07, 0.09),
+                smooth=0.06,
+            )
+        )
     return union(*parts)
 
 
@@ -301,8 +309,11 @@ def _ruins() -> Shape:
         box((1.5, 0.55, 0.8)).transform(spin(0, 24, 9)).at(4.0, 0.18, 6.4),
         box((0.9, 0.6, 0.7)).transform(spin(12, -30, 4)).at(-9.9, 0.2, 3.7),
         box((0.6, 0.4, 0.5)).transform(spin(-14, 50, 10)).at(8.6, 0.12, 5.4),
-        (column(1.3) & box((1.6, 1.6, 1.6)).at(0, 1.2, 0)).at(0, -0.9, 0).transform(spin(0, 20, 104)).at(-6.2, 0.42, 5.9),
-    ]  # fmt: skip
+        (column(1.3) & box((1.6, 1.6, 1.6)).at(0, 1.2, 0))
+        .at(0, -0.9, 0)
+        .transform(spin(0, 20, 104))
+        .at(-6.2, 0.42, 5.9),
+    ]
     return union(*parts).material(WORN)
 
 
@@ -326,9 +337,13 @@ def _ground(random: np.random.Generator) -> Shape:
             stone = ellipsoid((size, 0.5 * size, 0.75 * size)).transform(turn)
         stones.append(stone.at(x, 0.02, z))
     path = [
-        egg((random.uniform(-0.5, 0.5) + 0.9 * math.sin(0.5 * i), 0.07, 2.7 + 0.95 * i), (0.62, 0.07, 0.4), spin(0, 67 * i))
+        egg(
+            (random.uniform(-0.5, 0.5) + 0.9 * math.sin(0.5 * i), 0.07, 2.7 + 0.95 * i),
+            (0.62, 0.07, 0.4),
+            spin(0, 67 * i),
+        )
         for i in range(10)
-    ]  # fmt: skip
+    ]
     land = intersection(land, box((64, 14, 54)).at(0, -1, -6))
     return union(land, union(*stones).material(ROCK), union(*path).material(SHADED))
 
@@ -355,10 +370,15 @@ def _olive(at: tuple[float, float, float], size: float, random: np.random.Genera
     crown = [
         egg((x, y + random.uniform(-0.1, 0.1), z), (r, 0.75 * r, r))
         for x, y, z, r in (
-            (0, 2.15, 0, 0.75), (0.8, 1.95, 0.1, 0.6), (-0.8, 1.95, 0, 0.62), (0.3, 1.95, 0.6, 0.55),
-            (-0.35, 2.0, -0.5, 0.6), (0.35, 2.5, -0.1, 0.5), (-0.4, 2.45, 0.2, 0.48),
+            (0, 2.15, 0, 0.75),
+            (0.8, 1.95, 0.1, 0.6),
+            (-0.8, 1.95, 0, 0.62),
+            (0.3, 1.95, 0.6, 0.55),
+            (-0.35, 2.0, -0.5, 0.6),
+            (0.35, 2.5, -0.1, 0.5),
+            (-0.4, 2.45, 0.2, 0.48),
         )
-    ]  # fmt: skip
+    ]
     return union(trunk, union(*crown, smooth=0.12).material(OLIVE)).scale(size).at(*at)
 
 
@@ -386,9 +406,9 @@ def _hills() -> Shape:
 
 
 def _bird() -> Shape:
-    wings = [
-        limb((0, 0, 0), (side * 0.42, 0.16, -0.02), 0.06, 0.045) for side in (-1, 1)
-    ] + [limb((side * 0.42, 0.16, -0.02), (side * 0.95, 0.05, -0.16), 0.045, 0.012) for side in (-1, 1)]  # fmt: skip
+    wings = [limb((0, 0, 0), (side * 0.42, 0.16, -0.02), 0.06, 0.045) for side in (-1, 1)] + [
+        limb((side * 0.42, 0.16, -0.02), (side * 0.95, 0.05, -0.16), 0.045, 0.012) for side in (-1, 1)
+    ]
     return union(limb((0, 0, 0.24), (0, 0, -0.26), 0.07, 0.03), *wings, smooth=0.04)
 
 
