@@ -23,6 +23,8 @@ from tyndall.scene.model import (
     Scene,
 )
 from tyndall.sdf import box, sphere, union
+from tyndall.techniques.shadow.ray_traced import RayTraced
+from tyndall.techniques.shadow.shadow_map import ShadowMap
 
 ROUGH = Material("rough", base_color=(0.8, 0.7, 0.6, 1), roughness=0.9)
 RED = Material("red", base_color=(0.8, 0.1, 0.1, 1), roughness=0.4)
@@ -150,3 +152,23 @@ def test_loops_that_are_ended_early_are_no_truth(gpu: Gpu) -> None:
     scene = Scene((), (SUN,), Camera((0, 1, 4), (0, 0, 0), fov=0.3), implicits=[Implicit(wide)])
     with pytest.raises(GpuError, match="march for longer"):
         traced(gpu, scene, size=(3, 2))
+
+
+def test_shadow_techniques_tend_to_it(gpu: Gpu) -> None:
+    """Off the rims, which a frame draws by a part of a pixel wider."""
+    thing = (sphere(0.5) | box((0.9, 0.3, 0.5)).at(0.5, -0.3, 0)).at(-0.2, 0.1, -3)
+    sun = DirectionalLight((0.4, -1, -0.3), 2.0, angular_diameter=0.2)
+    scene = Scene([props.floor(-0.6, 4, ROUGH)], [sun], props.AHEAD, implicits=[Implicit(thing, material=ROUGH)])
+    size = (40, 30)
+    found = traced(gpu, scene, TruthSettings(target=4e-3), size)
+    got = {
+        "rays": props.shoot(gpu, scene, size, shadow=RayTraced(samples=16, fresh=1), frames=4),
+        "hard": props.shoot(gpu, scene, size, shadow=ShadowMap(size=1024)),
+    }
+    seen = np.where(np.isfinite(found.depth), found.depth, 1e3)
+    alike = np.abs(got["rays"].depth - seen) < 2e-3 * seen
+    alike[1:-1, 1:-1] &= alike[:-2, 1:-1] & alike[2:, 1:-1] & alike[1:-1, :-2] & alike[1:-1, 2:]
+    assert alike.mean() > 0.25
+    off = {name: props.difference(shot.radiance[alike], found.radiance[alike]) for name, shot in got.items()}
+    assert off["rays"] < 0.02, off
+    assert off["rays"] < 0.5 * off["hard"] < 0.2, off
