@@ -366,7 +366,7 @@ def glowing() -> Scene:
 
 
 def rounded() -> Scene:
-    """As :func:`occluded`, but what throws the shadow is an implicit surface: two materials melt, and there is a cut."""
+    """As :func:`occluded`, but an implicit surface throws the shadow: two materials melt, and there is a cut."""
     red = Material("red", base_color=(0.8, 0.2, 0.1, 1), roughness=0.5)
     shape = sdf.union(sdf.sphere(0.5).material(red), sdf.box((0.9, 0.4, 0.4)).at(0.4, -0.2, 0), smooth=0.15)
     thing = (shape - sdf.sphere(0.3).at(0.1, 0.3, 0.4)).at(-0.1, -0.3, -3.0)
