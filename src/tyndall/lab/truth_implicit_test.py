@@ -142,12 +142,12 @@ def test_the_cache_knows_the_code_of_implicit_surfaces(gpu: Gpu, monkeypatch: py
 
 
 def test_loops_that_are_ended_early_are_no_truth(gpu: Gpu) -> None:
-    """A software adapter would say nothing. All beads are in one cell of an object that is a thousand kilometres wide,
+    """A software adapter would say nothing. All 4000 beads are in one cell of an object that is a thousand kilometres wide,
     so that none is left out anywhere.
     """
     if gpu.adapter_info["adapter_type"] != "CPU":
         pytest.skip("a GPU takes its time")
-    beads = [sphere(0.2).at(*place) for place in np.random.default_rng(1).uniform(-1, 1, (1000, 3))]
+    beads = [sphere(0.2).at(*place) for place in np.random.default_rng(1).uniform(-1, 1, (4000, 3))]
     wide = union(*beads, box((1e6, 1.0, 1e6)).at(0, -1000, 0))
     scene = Scene((), (SUN,), Camera((0, 1, 4), (0, 0, 0), fov=0.3), implicits=[Implicit(wide)])
     with pytest.raises(GpuError, match="march for longer"):
