@@ -142,7 +142,7 @@ def test_the_cache_knows_the_code_of_implicit_surfaces(gpu: Gpu, monkeypatch: py
 
 
 def test_loops_that_are_ended_early_are_no_truth(gpu: Gpu) -> None:
-    """A software adapter would say nothing. All 4000 beads are in one cell of an object that is a thousand kilometres wide,
+    """A software adapter would say nothing. All beads are in one cell of an object that is a thousand kilometres wide,
     so that none is left out anywhere.
     """
     if gpu.adapter_info["adapter_type"] != "CPU":
