@@ -109,12 +109,13 @@ def test_every_entry_point_compiles_and_is_used(gpu: Gpu, monkeypatch: pytest.Mo
     cloud = Volume(sphere(0.5), Medium(0.1))
     fields = Scene(SHAPES[:1], LIGHTS[:1], props.AHEAD, Medium(0.1), implicits=surfaces, volumes=[cloud])
     with Renderer(fields, (8, 6), gpu=gpu, shadow=ShadowMap(size=16)) as renderer:
-        for family in ("shadow", "occlusion", "reflection", "volume"):
-            for name, cls in FAMILIES[family].members.items():
-                small = {f.name: 16 for f in fields_of(cls) if f.name in ("size", "map_size")}
-                renderer.use(family, FAMILIES[family].make(name, changes=small))
-                renderer.draw()
-            renderer.use(family, ShadowMap(size=16) if family == "shadow" else FAMILIES[family].default)
+        renderer.draw()  # reflections and clouds are drawn unless told otherwise
+        renderer.use("occlusion", "field_ao")
+        for name in ("field", "planar", "projective"):
+            cls = FAMILIES["shadow"].members[name]
+            small = {f.name: 16 for f in fields_of(cls) if f.name in ("size", "map_size")}
+            renderer.use("shadow", FAMILIES["shadow"].make(name, changes=small))
+            renderer.draw()
     with Field(gpu, surfaces) as field:
         values(gpu, field, 0, np.zeros((1, 3)))
     for depth in (2, 3):
