@@ -250,7 +250,7 @@ class _Run:
                 "size": list(settings.size),
                 "seconds": settings.seconds,
                 "loop_seconds": settings.loop_seconds,
-                "frame": dict(FRAME),
+                "frame": techniques(),
             },
             "scenes": [],
         }
