@@ -290,8 +290,8 @@ def _peer(document: Document) -> str:
         )  # fmt: skip
     rows += [[f"`{row['scene']}`", row["reason"], "–", "–"] for row in peer.get("failed_scenes", ())]
     text = (
-        f"wgpu-shadertoy {peer.get('version', '?')} on {peer.get('adapter', '?')}: the plain loop's text in its fragment "
-        "shader, compiled with wgpu's limits on loops; milliseconds of a whole frame by the clock, and ours."
+        f"wgpu-shadertoy {peer.get('version', '?')} on {peer.get('adapter', '?')}: the plain loop's text in its "
+        "fragment shader, compiled with wgpu's limits on loops; milliseconds of a whole frame by the clock, and ours."
     )
     return f"### Beside wgpu-shadertoy\n\n{text}\n\n{_table(['scene', 'ms', 'ours', 'over it'], rows)}"
 
