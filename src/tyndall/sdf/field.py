@@ -277,6 +277,7 @@ class Field(Closing):
             row["base_color"], row["emissive"] = m.base_color[:3], m.emissive
             row["metallic"], row["roughness"] = m.metallic, m.roughness
             row["shader"], row["numbers"], row["lit"] = shader + 1, first_number + at, getattr(m, "lit", True)
+            row["clear"] = m.reflections, m.transmission, m.ior, m.attenuation_distance
         return rows
 
     def _bind(self) -> dict[str, Any]:
