@@ -15,6 +15,7 @@ from tyndall.gpu.device import Gpu, GpuError
 from tyndall.gpu.params import fields_of
 from tyndall.lab.baseline import Baseline
 from tyndall.lab.busy import Busy
+from tyndall.lab.field_check import values
 from tyndall.lab.truth import TruthSettings, trace
 from tyndall.scene.model import (
     DirectionalLight,
@@ -30,6 +31,7 @@ from tyndall.scene.model import (
     Texture,
 )
 from tyndall.sdf import box, sphere, union
+from tyndall.sdf.field import Field
 from tyndall.sdf.snippets import Snippet, SnippetSource, evaluate
 from tyndall.techniques import FAMILIES
 from tyndall.techniques.contract import Unsupported
@@ -114,6 +116,8 @@ def test_every_entry_point_compiles_and_is_used(gpu: Gpu, monkeypatch: pytest.Mo
         cast(gpu, world, [[0, 0, 0]], [[0, 0, -1]])
         blocked(gpu, world, [[0, 0, 0]], [[0, 0, -1]])
     evaluate(gpu, Snippet(SnippetSource("plane", "fn plane(p: vec3f) -> f32 { return p.y; }")), np.zeros((1, 3)))
+    with Field(gpu, [Implicit(sphere())]) as field:
+        values(gpu, field, 0, [[0, 0, 0]])
     for stage in ("fragment", "compute"):
         with Baseline(gpu, Scene(implicits=(Implicit(sphere()),)), (8, 6), stage=stage):  # type: ignore[arg-type]
             pass
