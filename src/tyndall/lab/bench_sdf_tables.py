@@ -267,9 +267,9 @@ def _agreement(document: Document) -> str:
                     ]
                 )
     text = (
-        "A cell's program against the whole one. What a ray is told may also be a bound, which must be of the same sign "
-        "and no larger than the value. Half of the points are near the surfaces. *Entries* are instructions in the lists "
-        "of all cells; *overflows*, cells that had to keep their parent's."
+        "A cell's program against the whole one. What a ray is told may also be a bound, which must be of the same "
+        "sign and no larger than the value. Half of the points are near the surfaces. *Entries* are instructions in "
+        "the lists of all cells; *overflows*, cells that had to keep their parent's."
     )
     return f"### Pruned and whole values\n\n{text}\n\n{_table(heading, rows)}"
 
