@@ -31,7 +31,7 @@ from tyndall.scene.model import (
     Texture,
     Volume,
 )
-from tyndall.sdf import sphere, union
+from tyndall.sdf import box, sphere, union
 from tyndall.sdf.field import Field
 from tyndall.sdf.snippets import Snippet, SnippetSource, evaluate
 from tyndall.techniques import FAMILIES
@@ -125,6 +125,8 @@ def test_every_entry_point_compiles_and_is_used(gpu: Gpu, monkeypatch: pytest.Mo
         cast(gpu, world, [[0, 0, 0]], [[0, 0, -1]])
         blocked(gpu, world, [[0, 0, 0]], [[0, 0, -1]])
     evaluate(gpu, Snippet(SnippetSource("plane", "fn plane(p: vec3f) -> f32 { return p.y; }")), np.zeros((1, 3)))
+    with Field(gpu, [Implicit(sphere())]) as field:
+        values(gpu, field, 0, [[0, 0, 0]])
     for stage in ("fragment", "compute"):
         with Baseline(gpu, Scene(implicits=(Implicit(sphere()),)), (8, 6), stage=stage):  # type: ignore[arg-type]
             pass
