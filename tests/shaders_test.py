@@ -28,6 +28,7 @@ from tyndall.scene.model import (
     Scene,
     SpotLight,
     Texture,
+    Volume,
 )
 from tyndall.sdf import box, sphere, union
 from tyndall.sdf.snippets import Snippet, SnippetSource, evaluate
@@ -101,9 +102,11 @@ def test_every_entry_point_compiles_and_is_used(gpu: Gpu, monkeypatch: pytest.Mo
     with Renderer(solid, (8, 6), gpu=gpu, shadow=ShadowMap(size=64, rasterizer="compute")) as renderer:
         renderer.draw()
     shape = union(*[solid(size) for size in (0.3, 0.4, 0.5) for solid in (sphere, box)], smooth=0.1)
-    surfaces = [Implicit(shape, _mirror, Material(emissive=(1, 1, 1)))]
-    fields = Scene(SHAPES[:1], LIGHTS[:1], props.AHEAD, implicits=surfaces)
-    with Renderer(fields, (8, 6), gpu=gpu, shadow=ShadowMap(size=64)) as renderer:
+    surfaces = [Implicit(shape, _mirror, Material(emissive=(1, 1, 1), reflections=True))]
+    clouds = [Volume(sphere(0.5), Medium(0.5))]
+    fields = Scene(SHAPES[:1], LIGHTS[:1], props.AHEAD, implicits=surfaces, volumes=clouds)
+    with Renderer(fields, (8, 6), gpu=gpu, shadow="field", occlusion="field_ao") as renderer:
+        renderer.draw()
         for name in ("shadow_map", "planar", "projective"):
             renderer.use("shadow", FAMILIES["shadow"].make(name, changes={"map_size": 64} if name[0] == "p" else None))
             renderer.draw()
