@@ -12,7 +12,7 @@ import tyndall
 from tyndall.app import arguments
 from tyndall.app.cli import main
 from tyndall.lab.truth import TruthSettings
-from tyndall.scene import bundled
+from tyndall.lab import bundled
 from tyndall.techniques import FAMILIES
 
 ROOT = Path(__file__).parents[1]

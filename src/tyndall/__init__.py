@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from tyndall.lab.render import render
     from tyndall.lab.sweep import Sweep, SweepError, sweep
     from tyndall.lab.truth import Truth, TruthSettings, trace
-    from tyndall.scene import bundled as scenes
+    from tyndall.lab import bundled as scenes
     from tyndall.scene.errors import SceneError
     from tyndall.scene.files import load, save
     from tyndall.scene.model import (
@@ -174,7 +174,7 @@ def __getattr__(name: str) -> Any:
     if name not in __all__:
         raise AttributeError(f"module 'tyndall' has no attribute '{name}'")
     if name == "scenes":
-        value: Any = importlib.import_module("tyndall.scene.bundled")
+        value: Any = importlib.import_module("tyndall.lab.bundled")
     elif name == "sdf":
         value = importlib.import_module("tyndall.sdf")
     else:

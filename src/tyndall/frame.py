@@ -68,6 +68,11 @@ _IMAGES = {
     "lit": "rgba16float",
     "picture": "rgba8unorm",
 }
+# What `motion.wesl` asks for: where what a pixel shows was in the last frame.
+_STILL = "fn place_before(pixel: vec2u, p: vec3f) -> vec3f { return p; }"
+_MOVING = """\
+import package::content::implicit::field_place_before;
+fn place_before(pixel: vec2u, p: vec3f) -> vec3f { return field_place_before(pixel, p); }"""
 _TARGETS = ("normal_roughness", "albedo_metallic", "emissive")
 
 
@@ -179,7 +184,7 @@ class Renderer(Closing):
         count = max(1, len(self.scene.lights))
         self._lights = self._buffer("lights", count * gpu.dtype(_LIGHT).itemsize, _LIGHT, "storage")
         self._scope: dict[str, Any] = {
-            "camera": self._camera.uniform(),
+            "camera": self._camera.uniform().telling(_MOVING if self._fields else _STILL),
             "medium": self._medium.uniform(),
             "lights": self._lights.read().declaring(**light_kinds(self.scene)),
             "black": black.sampled(),
@@ -188,6 +193,7 @@ class Renderer(Closing):
             "transmittance_out": self._images["transmittance_map"].write(),
         }
         if self._fields:
+            self._scope |= self._fields.bindings
             self._scope |= {f"{name}_out": self._images[name].write() for name in self._targets}
         gpu.write(self._medium, pack_medium(self.scene.medium, gpu.dtype(_MEDIUM)))
         gpu.write(self._lights, pack_lights(self.scene, gpu.dtype(_LIGHT)))
@@ -311,7 +317,7 @@ class Renderer(Closing):
         if self._fields:
             field = self._fields.field
             self._uploaded = field.uploaded - self._sent
-            field.update()
+            self._fields.update()
             self._sent = field.uploaded
         # Its stencil, where it has one, is cleared with it: drivers pack the two, and clear both at once or neither.
         clear = 0 if images["depth"].has_stencil else None
@@ -403,7 +409,7 @@ class Renderer(Closing):
             raise ParameterError(f"which: the scene has {len(self.scene.implicits)} implicit surfaces, and no {which}")
         (matrix,) = transforms("transform", transform)
         placed = replace(self.scene.implicits[which], transform=matrix)
-        self._fields.field.place(which, matrix)
+        self._fields.place(which, matrix)
         self._moved = True
         if placed.bounds is not None:
             self._hold(*placed.bounds)

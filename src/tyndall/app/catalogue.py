@@ -121,7 +121,7 @@ def allowed(f: Field) -> str:
 
 def scenes_json() -> list[dict[str, Any]]:
     """The bundled scenes, as plain data; none of them is built."""
-    from tyndall.scene import bundled
+    from tyndall.lab import bundled
 
     return [
         {

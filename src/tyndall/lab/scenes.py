@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from tyndall.gpu.params import ParameterError, nearest, replace
-from tyndall.scene import bundled
+from tyndall.lab import bundled
 from tyndall.scene.errors import SceneError
 from tyndall.scene.files import MESH_SUFFIXES, SUFFIXES, load
 from tyndall.scene.model import Scene

@@ -36,7 +36,7 @@ from tyndall.lab.scenes import open_scene
 from tyndall.lab.stage import Stage, Still
 from tyndall.lab.sweep_spec import OTHERS
 from tyndall.lab.truth import Truth, TruthSettings
-from tyndall.scene import bundled
+from tyndall.lab import bundled
 from tyndall.scene.model import Scene
 from tyndall.techniques import FAMILIES
 from tyndall.techniques.contract import Technique

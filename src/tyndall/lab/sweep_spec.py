@@ -39,7 +39,7 @@ from tyndall.lab.fingerprint import scene_hash
 from tyndall.lab.scenes import open_scene
 from tyndall.lab.stage import describe, make
 from tyndall.lab.truth import TruthSettings
-from tyndall.scene import bundled
+from tyndall.lab import bundled
 from tyndall.scene.errors import SceneError
 from tyndall.scene.files.schema import path_text
 from tyndall.scene.model import Scene

@@ -18,15 +18,15 @@ program where some nodes do not matter is a part of it in the same order, with a
 
 Slots, in vec4f; ``k`` is the width of a smooth join, ``L`` the Lipschitz bound of the value in the object's space:
 
-- LEAF: ``(translation, factor) (a) (b) (k, L, material or −1, margin)``, and where it may be turned the three rows of the
-  transform from the object's to the leaf's space. The translation is subtracted; the rows hold theirs themselves.
+- LEAF: ``(translation, factor) (a) (b) (k, L, material or −1, margin)``, and where it may be turned the three rows of
+  the transform from the object's to the leaf's space. The translation is subtracted; the rows hold theirs themselves.
 - COMBINE: ``(k, L, −, −)``.
 - ENTER and LEAVE of a modifier: ``(a) (b) (−, L, −, −)``; of an affine transform (code AFFINE) ``(row) (row) (row)
   (factor, L, −, −)``.
 
 A leaf that only unions lie above has a *margin* ≥ 0, others −1: where its value is above that of the whole by more than
-the margin, it does not matter. A smooth union of width k is at least a − k where a still matters, so the margin is the sum of k over
-the unions above (and what takes its place for the other blends).
+the margin, it does not matter. A smooth union of width k is at least a − k where a still matters, so the margin is the
+sum of k over the unions above (and what takes its place for the other blends).
 
 Affine transforms are multiplied into the leaves below, except around what changes places by itself and around parts
 with a name, which move as one.
@@ -45,6 +45,7 @@ from numpy.typing import NDArray
 
 from tyndall.gpu.params import ParameterError
 from tyndall.scene.model import Material
+from tyndall.sdf.repetition import Repetition
 from tyndall.sdf.shape import (
     Combination,
     Floats,
@@ -100,8 +101,8 @@ class Kinds:
         return not self.sources()
 
     def wesl(self) -> str:
-        """Text for the bindings module: ``implicit_primitive``, its numbers in the slots or given, ``implicit_enter`` and
-        ``implicit_leave``.
+        """Text for the bindings module: ``implicit_primitive``, its numbers in the slots or given, ``implicit_enter``
+        and ``implicit_leave``.
         """
         leaf, leaf_of, enter, leave, texts = [], [], [], [], []
         for code, shape in self._primitives.values():
@@ -144,12 +145,24 @@ def _payload(shape: Primitive) -> NDArray[np.float32] | None:
     return getattr(shape, "payload", None)
 
 
+_CASES = 32  # of one switch: Mesa's software adapter makes a nest of them, and gives zeros below 80 levels
+
+
 def _switch(signature: str, cases: Sequence[tuple[int, str]], otherwise: str) -> str:
-    lines = [f"case {code}u: {{ return {value}; }}" for code, value in cases]
-    body = (
-        f"switch code {{ {' '.join(lines)} default: {{ return {otherwise}; }} }}" if cases else f"return {otherwise};"
-    )
-    return f"fn {signature} {{ {body} }}"
+    """A function of ``code``, whose cases are numbered from 0 but for gaps: one switch, or one of several of them."""
+    if len(cases) <= _CASES:
+        lines = [f"case {code}u: {{ return {value}; }}" for code, value in cases]
+        body = f"switch code {{ {' '.join(lines)} default: {{ return {otherwise}; }} }}"
+        return f"fn {signature} {{ {body if cases else f'return {otherwise};'} }}"
+    name, arguments = signature.partition("(")[::2]
+    names = ", ".join(part.partition(":")[0].strip() for part in arguments.partition(")")[0].split(","))
+    texts, calls = [], []
+    for i in range(0, len(cases), _CASES):
+        texts.append(_switch(f"{name}_{i // _CASES}({arguments}", cases[i : i + _CASES], otherwise))
+        calls.append(
+            f"if code <= {cases[min(i + _CASES, len(cases)) - 1][0]}u {{ return {name}_{i // _CASES}({names}); }}"
+        )
+    return "\n".join([*texts, f"fn {signature} {{ {' '.join(calls)} return {otherwise}; }}"])
 
 
 @dataclass(frozen=True, eq=False)
@@ -332,13 +345,11 @@ class _Compiler:
             case Modifier():
                 self._modifier(shape, c)
                 self._join(join, blend, k, shape.lipschitz * c.stretch)
-            case _ if hasattr(shape, "copies"):
-                made = Combination(tuple(shape.copies()))
-                if all(getattr(copy, "continuous", True) for copy in made.shapes):
-                    self._combination(made, c, join, blend, k, copies=True)
-                else:  # the values of the copies jump, only that of all together does not
-                    self._scope(made, c, opaque=True, copies=True)
-                    self._join(join, blend, k, shape.lipschitz * c.stretch)
+            case Repetition() if not shape.opaque:
+                self._combination(Combination(shape.copies()), c, join, blend, k, copies=True)
+            case Repetition():  # the values of the copies jump, only that of all together does not
+                self._scope(Combination(shape.copies()), c, opaque=True, copies=True)
+                self._join(join, blend, k, shape.lipschitz * c.stretch)
             case _:
                 raise ParameterError(f"shape: a {type(shape).__name__} has no program")
 
@@ -527,9 +538,6 @@ class _Compiler:
             self._places -= 1
         if shape.warps or shape.adjusts:
             self._word(LEAVE, code, flags=PLACED if shape.warps else 0, slot=slot)
-
-    def _forever(self, shape: Shape, c: _Context) -> None:
-        raise ParameterError(f"shape: a {type(shape).__name__} has no program")
 
 
 def _is_leaf(shape: Shape) -> bool:
