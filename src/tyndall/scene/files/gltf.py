@@ -333,7 +333,7 @@ class _Reader:
                 double_sided=row.flag("doubleSided"),
                 transmission=row.object("extensions", "KHR_materials_transmission").number("transmissionFactor", 0.0),
                 ior=ior or 1.5,  # 0 asks for a mirror at every angle in older files
-                **maps,
+                **maps,  # type: ignore[arg-type]
             )
         except ParameterError as error:
             row.stop(str(error))
