@@ -11,8 +11,8 @@ import pytest
 import tyndall
 from tyndall.app import arguments
 from tyndall.app.cli import main
-from tyndall.lab.truth import TruthSettings
 from tyndall.lab import bundled
+from tyndall.lab.truth import TruthSettings
 from tyndall.techniques import FAMILIES
 
 ROOT = Path(__file__).parents[1]

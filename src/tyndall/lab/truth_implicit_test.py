@@ -12,7 +12,6 @@ from tyndall.gpu.device import Gpu, GpuError
 from tyndall.lab import truth as module
 from tyndall.lab.meshed import meshed
 from tyndall.lab.truth import Truth, TruthSettings, trace, unit_of
-from tyndall.lab.ztest import z_test
 from tyndall.scene.model import (
     Camera,
     DirectionalLight,

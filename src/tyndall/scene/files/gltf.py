@@ -54,6 +54,8 @@ EXTENSIONS = {
     "EXT_texture_webp",
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",
+    "KHR_materials_ior",
+    "KHR_materials_transmission",
     "KHR_materials_unlit",
     "KHR_mesh_quantization",
     "KHR_texture_transform",
@@ -316,6 +318,7 @@ class _Reader:
         if mode == "BLEND":
             self._warn(row.where, "alphaMode BLEND is drawn as MASK")
         strength = row.object("extensions", "KHR_materials_emissive_strength").number("emissiveStrength", 1.0)
+        ior = row.object("extensions", "KHR_materials_ior").number("ior", 1.5)
         try:
             material = Material(
                 name=row.text("name"),
@@ -328,7 +331,9 @@ class _Reader:
                 alpha_mode="opaque" if mode == "OPAQUE" else "mask",
                 alpha_cutoff=row.number("alphaCutoff", 0.5),
                 double_sided=row.flag("doubleSided"),
-                **maps,
+                transmission=row.object("extensions", "KHR_materials_transmission").number("transmissionFactor", 0.0),
+                ior=ior or 1.5,  # 0 asks for a mirror at every angle in older files
+                **maps,  # type: ignore[arg-type]
             )
         except ParameterError as error:
             row.stop(str(error))
