@@ -2,10 +2,12 @@
 
     python benchmarks/sdf.py [--quick] [--seconds 5] [--parts scenes,swarm] [--scenes snail] [--swarm 10,1000]
                              [--peer only|none] [--out DIR]
+    python benchmarks/sdf.py --join FIRST.json SECOND.json …
 
 It is what ``tyndall bench sdf`` measures, with wgpu-shadertoy's whole frames under ``peer`` (see
 ``peer_shadertoy.py``). The document and its tables are also saved in ``--out``, or else in the folder that ``$OUT``
-names: ``sdf.json`` and ``sdf.md``; the document grows there as figures come.
+names: ``sdf.json`` and ``sdf.md``; the document grows there as figures come. ``--join`` makes one document of those of
+several runs on one adapter, each of some ``--parts``.
 """
 
 from __future__ import annotations
@@ -17,6 +19,7 @@ import os
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import peer_shadertoy
 
@@ -38,7 +41,12 @@ def main() -> None:
     parser.add_argument("--size", help="WxH")
     parser.add_argument("--peer", choices=("too", "only", "none"), default="too")
     parser.add_argument("--out", type=Path, default=os.environ.get("OUT"))
+    parser.add_argument("--join", type=Path, nargs="+", help="documents of some parts each")
     chosen = parser.parse_args()
+    if chosen.join:
+        read = [json.loads(path.read_text(encoding="utf-8")) for path in chosen.join]
+        keep(bench_sdf.join(read), chosen.out)
+        return
     base = bench_sdf.QUICK if chosen.quick else bench_sdf.Settings()
     changes: dict[str, object] = {
         "parts": () if chosen.peer == "only" else tuple(chosen.parts.split(",")) if chosen.parts else None,
@@ -69,9 +77,13 @@ def main() -> None:
             scenes, settings.size, seconds=settings.loop_seconds, progress=lambda text: tell(1.0, text)
         )
     document["seconds"] = round(time.monotonic() - begin, 1)
-    whole = SdfBench(document)
-    if chosen.out:
-        whole.save(chosen.out)
+    keep(document, chosen.out)
+
+
+def keep(document: dict[str, Any], out: Path | None) -> None:
+    """Save a document and its tables, and print it."""
+    if out:
+        SdfBench(document).save(out)
     print(json.dumps(document, indent=1, ensure_ascii=False))
 
 

@@ -13,6 +13,7 @@ scene = ty.Scene(
     implicits=(ty.Implicit(drops, material=ty.Material(base_color=(0.1, 0.4, 0.6, 1), roughness=0.2)),),
     lights=(ty.DirectionalLight(direction=(-0.5, -1, -0.6), intensity=3),),
     camera=ty.Camera(position=(0, 0.5, 5)),
+    ambient=(0.3, 0.3, 0.3),
     motion=lambda time: {"drop": 0.4 * np.sin(time * speeds)},
     room=((-2.5, -2.5, -2.5), (2.5, 2.5, 2.5)),
 )
@@ -21,5 +22,4 @@ with ty.Renderer(scene, (160, 120), volumetric="off", shadow=ty.ShadowMap(size=2
     for number in range(6):
         renderer.draw(time=number / 4)
         frames.append(Image.fromarray(renderer.picture()))
-print(f"{renderer.uploaded:,} bytes sent for the last frame")
 frames[0].save("drops.webp", save_all=True, append_images=frames[1:], duration=80, loop=0)

@@ -21,6 +21,7 @@ from tyndall.scene.model import (
     DirectionalLight,
     Gibbons,
     HenyeyGreenstein,
+    Implicit,
     Instance,
     Light,
     Material,
@@ -33,6 +34,8 @@ from tyndall.scene.model import (
     SpotLight,
     Vec3,
 )
+from tyndall.sdf import box as box_shape
+from tyndall.sdf import sphere
 from tyndall.techniques.contract import Technique
 from tyndall.techniques.shadow.shadow_map import ShadowMap
 
@@ -129,6 +132,13 @@ def slits(z: float, half: float, width: float, count: int, material: Material = 
         box((-half + i * pitch, -half, z - 0.05), (-half + (i + 1) * pitch - width, half, z), material)
         for i in range(count)
     ]
+
+
+def fields(*implicits: Implicit, specks: Vec3 = (0, -0.5, 0), material: Material = Material()) -> tuple[Implicit, ...]:
+    """Implicit surfaces with specks that nobody sees: four in all, of balls and boxes, so that scenes share shaders."""
+    shapes = (sphere(1e-6), box_shape(1e-6), sphere(1e-6), sphere(1e-6))
+    extra = [Implicit(shape.at(*specks), material=material) for shape in shapes]
+    return (*extra[: 4 - len(implicits)], *implicits)
 
 
 # --- what a camera sees -------------------------------------------------------------------------------------------

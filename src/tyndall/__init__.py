@@ -47,14 +47,17 @@ if TYPE_CHECKING:
         Schlick,
         SpotLight,
         Texture,
+        Volume,
     )
     from tyndall.scene.stage import stage
     from tyndall.techniques.antialiasing import NoAntialiasing, Taa
-    from tyndall.techniques.occlusion import NoOcclusion, RayTracedAo
+    from tyndall.techniques.occlusion import FieldAo, NoOcclusion, RayTracedAo
+    from tyndall.techniques.reflection import FieldReflections, NoReflections
     from tyndall.techniques.shadow import (
         Blurred,
         Esm,
         Evsm,
+        FieldShadows,
         Pcf,
         Pcss,
         PenumbraWedge,
@@ -66,6 +69,7 @@ if TYPE_CHECKING:
         Vsm,
     )
     from tyndall.techniques.tonemap import Aces, Agx, Clip
+    from tyndall.techniques.volume import NoVolumes, UniformMarch
     from tyndall.techniques.volumetric import Froxel, March, Off, Polygonal, ScreenSpace
 
 __version__ = "0.1.0"
@@ -80,6 +84,9 @@ __all__ = [
     "DirectionalLight",
     "Esm",
     "Evsm",
+    "FieldAo",
+    "FieldReflections",
+    "FieldShadows",
     "Froxel",
     "Gibbons",
     "GpuError",
@@ -94,6 +101,8 @@ __all__ = [
     "Mesh",
     "NoAntialiasing",
     "NoOcclusion",
+    "NoReflections",
+    "NoVolumes",
     "Off",
     "ParameterError",
     "Pcf",
@@ -122,6 +131,8 @@ __all__ = [
     "Texture",
     "Truth",
     "TruthSettings",
+    "UniformMarch",
+    "Volume",
     "Vsm",
     "__version__",
     "compare",
@@ -146,6 +157,8 @@ _HOMES = (
     "tyndall.techniques.volumetric",
     "tyndall.techniques.shadow",
     "tyndall.techniques.occlusion",
+    "tyndall.techniques.reflection",
+    "tyndall.techniques.volume",
     "tyndall.techniques.antialiasing",
     "tyndall.techniques.tonemap",
     "tyndall.frame",

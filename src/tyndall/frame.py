@@ -36,12 +36,16 @@ from tyndall.scene.model import (
     Scene,
     Schlick,
     SpotLight,
+    Volume,
     box_corners,
     transforms,
 )
+from tyndall.sdf.field import Field
 from tyndall.techniques import FAMILIES, Technique
 from tyndall.techniques.contract import View
+from tyndall.techniques.reflection.field_reflections import shows_surroundings
 from tyndall.techniques.shadow.depth_maps import first_layers
+from tyndall.techniques.volume import Filled
 from tyndall.tracing.world import World
 
 OWNER = "frame"
@@ -64,6 +68,11 @@ _IMAGES = {
     "lit": "rgba16float",
     "picture": "rgba8unorm",
 }
+# What `motion.wesl` asks for: where what a pixel shows was in the last frame.
+_STILL = "fn place_before(pixel: vec2u, p: vec3f) -> vec3f { return p; }"
+_MOVING = """\
+import package::content::implicit::field_place_before;
+fn place_before(pixel: vec2u, p: vec3f) -> vec3f { return field_place_before(pixel, p); }"""
 _TARGETS = ("normal_roughness", "albedo_metallic", "emissive")
 
 
@@ -75,8 +84,8 @@ class Renderer(Closing):
         size: width and height in pixels.
         gpu: the device to draw on; the renderer makes its own, and closes it, when none is given.
         adapter: part of an adapter's name, for a device of its own.
-        volumetric, shadow, occlusion, antialiasing, tonemap: techniques, by name or as instances; by name they start
-            from the scene's ``looks``.
+        volumetric, shadow, occlusion, reflection, volume, antialiasing, tonemap: techniques, by name or as instances;
+            by name they start from the scene's ``looks``.
         seed: of everything random.
 
     Raises:
@@ -96,6 +105,8 @@ class Renderer(Closing):
         volumetric: str | Technique | None = None,
         shadow: str | Technique | None = None,
         occlusion: str | Technique | None = None,
+        reflection: str | Technique | None = None,
+        volume: str | Technique | None = None,
         antialiasing: str | Technique | None = None,
         tonemap: str | Technique | None = None,
         seed: int = 0,
@@ -111,6 +122,8 @@ class Renderer(Closing):
             "volumetric": volumetric,
             "shadow": shadow,
             "occlusion": occlusion,
+            "reflection": reflection,
+            "volume": volume,
             "antialiasing": antialiasing,
             "tonemap": tonemap,
         }
@@ -122,6 +135,7 @@ class Renderer(Closing):
         self._images: dict[str, Texture] = {}
         self._content: list[Content] = []
         self._fields: Fields | None = None
+        self._volumes: list[Filled] = []
         self._world: World | None = None
         self._frame = 0
         self._history = 0
@@ -150,6 +164,8 @@ class Renderer(Closing):
         if self.scene.implicits:
             self._fields = Fields(gpu, self.scene, size)
             self._content.append(self._fields)
+        for volume in self.scene.volumes:
+            self._volumes.append(self._fill(volume))
         self._targets = _TARGETS if any(content.emits for content in self._content) else _TARGETS[:2]
         for name, format in _IMAGES.items():
             if name in _TARGETS and name not in self._targets:
@@ -161,13 +177,14 @@ class Renderer(Closing):
             image = gpu.texture(f"frame.{name}", size, format or gpu.depth_format, owner=OWNER, usage=usage)
             self._images[name] = image
             self._resources.append(image)
-        self._resolved = self._images["lit"]
+        self._resolved, self._base = self._images["lit"], self._images["base"]
+        self._shows_surroundings = shows_surroundings(self.scene)
         self._camera = self._buffer("camera", gpu.dtype(_CAMERA).itemsize, _CAMERA, "uniform")
         self._medium = self._buffer("medium", gpu.dtype(_MEDIUM).itemsize, _MEDIUM, "uniform")
         count = max(1, len(self.scene.lights))
         self._lights = self._buffer("lights", count * gpu.dtype(_LIGHT).itemsize, _LIGHT, "storage")
         self._scope: dict[str, Any] = {
-            "camera": self._camera.uniform(),
+            "camera": self._camera.uniform().telling(_MOVING if self._fields else _STILL),
             "medium": self._medium.uniform(),
             "lights": self._lights.read().declaring(**light_kinds(self.scene)),
             "black": black.sampled(),
@@ -176,11 +193,22 @@ class Renderer(Closing):
             "transmittance_out": self._images["transmittance_map"].write(),
         }
         if self._fields:
+            self._scope |= self._fields.bindings
             self._scope |= {f"{name}_out": self._images[name].write() for name in self._targets}
         gpu.write(self._medium, pack_medium(self.scene.medium, gpu.dtype(_MEDIUM)))
         gpu.write(self._lights, pack_lights(self.scene, gpu.dtype(_LIGHT)))
         for family, technique in techniques.items():
             self.use(family, technique)
+
+    def _fill(self, volume: Volume) -> Filled:
+        gpu = self.gpu
+        medium, edge = (
+            self._buffer(f"volume.{label}", size, element, "uniform")
+            for label, size, element in (("medium", gpu.dtype(_MEDIUM).itemsize, _MEDIUM), ("edge", 16, "f32"))
+        )
+        gpu.write(medium, pack_medium(volume.medium, gpu.dtype(_MEDIUM)))
+        gpu.write(edge, np.array([volume.edge, 0, 0, 0], np.float32))
+        return Filled(volume, Field(gpu, [volume.surface], owner="volume"), medium.uniform(), edge.uniform())
 
     def _buffer(self, label: str, size: int, element: str, usage: str) -> Any:
         buffer = self.gpu.buffer(f"frame.{label}", size, owner=OWNER, element=element, usage=usage)
@@ -204,7 +232,7 @@ class Renderer(Closing):
                     content.forget_bundles()
             self.gpu.forget_groups()
             self._history = 0
-            self._resolved = self._images["lit"]
+            self._resolved, self._base = self._images["lit"], self._images["base"]
         owner = f"{family}.{made.name}"
         self._views[family] = View(
             self.gpu,
@@ -289,7 +317,7 @@ class Renderer(Closing):
         if self._fields:
             field = self._fields.field
             self._uploaded = field.uploaded - self._sent
-            field.update()
+            self._fields.update()
             self._sent = field.uploaded
         # Its stencil, where it has one, is cleared with it: drivers pack the two, and clear both at once or neither.
         clear = 0 if images["depth"].has_stencil else None
@@ -301,7 +329,7 @@ class Renderer(Closing):
 
         shadow = self._view("shadow")
         shadow.maps_wanted = self.technique("volumetric").reads_maps
-        shadow.air_wanted = self.technique("volumetric").lights_air
+        shadow.air_wanted = self.technique("volumetric").lights_air or bool(self._volumes) or self._shows_surroundings
         visibility = self.technique("shadow").render(shadow, self._content if casters else [])
         occlusion = self.technique("occlusion").render(self._view("occlusion"))
         scope = {**scope, **visibility.bindings, **occlusion.bindings}
@@ -315,6 +343,14 @@ class Renderer(Closing):
         gpu.compute("lighting", _MODULE, "lighting").bind(scope, lit_out=images["base"].write()).overlay(
             overlay
         ).dispatch(*self.size)
+
+        base = images["base"]
+        if self._fields:
+            mirror = self._view("reflection", scope, overlay)
+            base = self.technique("reflection").render(mirror, base, self._fields.bindings)
+        if self._volumes:
+            base = self.technique("volume").render(self._view("volume", scope, overlay), base, self._volumes)
+        self._base, scope = base, {**scope, "base": base.sampled()}
 
         air = self._view("volumetric", scope, overlay)
         air.images = {**images, **({"shadow_maps": visibility.maps} if visibility.maps else {})}
@@ -373,7 +409,7 @@ class Renderer(Closing):
             raise ParameterError(f"which: the scene has {len(self.scene.implicits)} implicit surfaces, and no {which}")
         (matrix,) = transforms("transform", transform)
         placed = replace(self.scene.implicits[which], transform=matrix)
-        self._fields.field.place(which, matrix)
+        self._fields.place(which, matrix)
         self._moved = True
         if placed.bounds is not None:
             self._hold(*placed.bounds)
@@ -464,7 +500,7 @@ class Renderer(Closing):
 
     def base(self) -> NDArray[np.float32]:
         """(height, width, 3) float32: ``L_b``, the surfaces' light before the air."""
-        return np.ascontiguousarray(self.gpu.read_texture(self._images["base"])[..., :3].astype(np.float32))
+        return np.ascontiguousarray(self.gpu.read_texture(self._base)[..., :3].astype(np.float32))
 
     def inscattered(self) -> NDArray[np.float32]:
         """(height, width, 3) float32: ``L_v``, the light that the air scatters towards the camera."""
@@ -538,6 +574,7 @@ class Renderer(Closing):
         held = [content.resources() for content in self._content] + [view.resources() for view in self._views.values()]
         if self._world:
             held.append(self._world.resources())
+        held += [filled.field.resources() for filled in self._volumes]
         for resource in itertools.chain(self._resources, *held):
             totals[resource.owner] += resource.size_bytes
         return dict(totals)
@@ -552,10 +589,13 @@ class Renderer(Closing):
             self._world = None
         for content in self._content:
             content.close()
+        for filled in self._volumes:
+            filled.field.close()
         for resource in self._resources:
             resource.destroy()
         self._views.clear()
         self._content.clear()
+        self._volumes.clear()
         self._resources.clear()
         self.gpu.forget_groups()
         if self._own_gpu:

@@ -56,6 +56,8 @@ SceneName = Annotated[
 Size = Annotated[str, typer.Option(metavar="WxH", help="Width and height of the picture in pixels.")]
 Shadow = Annotated[str | None, typer.Option(metavar="NAME", help="Shadow technique.")]
 Occlusion = Annotated[str | None, typer.Option(metavar="NAME", help="Technique of ambient occlusion.")]
+Reflection = Annotated[str | None, typer.Option(metavar="NAME", help="Technique of reflections and refraction.")]
+VolumeName = Annotated[str | None, typer.Option("--volume", metavar="NAME", help="Technique of clouds inside shapes.")]
 Antialiasing = Annotated[str | None, typer.Option(metavar="NAME", help="Antialiasing technique.")]
 Tonemap = Annotated[str | None, typer.Option(metavar="NAME", help="Tone mapping.")]
 Model = Annotated[
@@ -107,6 +109,8 @@ def render(
     technique: Annotated[str, typer.Option(metavar="NAME", help="Volumetric technique.")] = "froxel",
     shadow: Shadow = None,
     occlusion: Occlusion = None,
+    reflection: Reflection = None,
+    volume: VolumeName = None,
     antialiasing: Antialiasing = None,
     tonemap: Tonemap = None,
     model: Model = None,
@@ -132,7 +136,8 @@ def render(
     if len(names) != 1:
         raise ParameterError(f"--technique: '{technique}' is not one technique; compare draws several")
     technique = names[0]
-    looks = {"occlusion": occlusion, "antialiasing": antialiasing, "tonemap": tonemap}
+    looks = {"occlusion": occlusion, "reflection": reflection, "volume": volume}
+    looks |= {"antialiasing": antialiasing, "tonemap": tonemap}
     families = {"volumetric": technique, **_others(shadow=shadow, **looks)}
     parameters = _parameters(context.obj.flags, "volumetric", [technique], families, model)
     with console.Work("loading") as work:
@@ -198,6 +203,8 @@ def compare(
         str | None, typer.Option(metavar="NAME", help="Shadow technique, where volumetric light is compared.")
     ] = None,
     occlusion: Occlusion = None,
+    reflection: Reflection = None,
+    volume: VolumeName = None,
     antialiasing: Antialiasing = None,
     tonemap: Tonemap = None,
     model: Annotated[
@@ -234,7 +241,8 @@ def compare(
     chosen = arguments.split_list(technique) if technique else None
     if chosen == []:
         raise ParameterError("--technique: no name is given")
-    looks = {"occlusion": occlusion, "antialiasing": antialiasing, "tonemap": tonemap}
+    looks = {"occlusion": occlusion, "reflection": reflection, "volume": volume}
+    looks |= {"antialiasing": antialiasing, "tonemap": tonemap}
     others = _others(volumetric=volumetric, shadow=shadow, **looks)
     if family in others:
         raise ParameterError(f"--{family}: it is {family} techniques that are compared; --technique names them")

@@ -46,6 +46,8 @@ def sweep(
     techniques: Annotated[Many, _values_of("Volumetric techniques; all if not given.")] = None,
     shadow: Annotated[Many, _values_of("Shadow techniques.")] = None,
     occlusion: Annotated[Many, _values_of("Techniques of ambient occlusion.")] = None,
+    reflection: Annotated[Many, _values_of("Techniques of reflections and refraction.")] = None,
+    volume: Annotated[Many, _values_of("Techniques of clouds inside shapes.")] = None,
     antialiasing: Annotated[Many, _values_of("Antialiasing techniques.")] = None,
     tonemap: Annotated[Many, _values_of("Tone mappings.")] = None,
     truth: Annotated[
@@ -89,6 +91,8 @@ def sweep(
         "techniques": _techniques(techniques),
         "shadow": _techniques(shadow),
         "occlusion": _techniques(occlusion),
+        "reflection": _techniques(reflection),
+        "volume": _techniques(volume),
         "antialiasing": _techniques(antialiasing),
         "tonemap": _techniques(tonemap),
         "truth": truth,

@@ -26,9 +26,10 @@ from tyndall.content.mesh import MAP_FORMAT
 from tyndall.content.outline import Outline
 from tyndall.content.rasterize import Triangles
 from tyndall.gpu.device import Gpu, Raster
-from tyndall.gpu.resources import Bound, Resource, Texture
+from tyndall.gpu.resources import Bound, Buffer, Resource, Texture
 from tyndall.scene.model import Implicit, Material, Scene
 from tyndall.sdf.field import Field
+from tyndall.sdf.shading import shines
 from tyndall.sdf.shape import Named, Painted, Shape
 
 MODULE = "package::content::implicit"
@@ -47,15 +48,20 @@ class Fields:
 
     def __init__(self, gpu: Gpu, scene: Scene, size: tuple[int, int]) -> None:
         self._gpu, self._size, self._lights = gpu, size, len(scene.lights)
+        self._placed = [np.asarray(one.transform) for one in scene.implicits]
+        self._moves = False
+        self._before: dict[int, NDArray[np.float64]] = {}
+        self._motion: Buffer | None = None
         self._images: dict[str, Texture] = {}
         self._maps: dict[int, Texture] = {}
         self._shade: Texture | None = None
-        self.emits = any(any(material.emissive) for one in scene.implicits for material in materials_of(one))
+        self.emits = any(shines(material) for one in scene.implicits for material in materials_of(one))
         self.parts = {node.name for one in scene.implicits for node in nodes_of(one.shape) if isinstance(node, Named)}
         self.field = Field(gpu, scene.implicits)
         try:
             for name, format in (("depth", "r32float"), ("ids", "r32uint")):
                 self._images[name] = gpu.texture(f"field.{name}", size, format, owner=OWNER)
+            self._motion = gpu.buffer("field.motion", self._still(), owner=OWNER, element=f"{MODULE}::Motion")
         except BaseException:
             self.close()
             raise
@@ -63,9 +69,37 @@ class Fields:
     @property
     def bindings(self) -> dict[str, Bound]:
         """What the last march found: ``field_depth`` (reversed-Z, 0: nothing) and ``field_ids`` (see
-        ``implicit.wesl``).
+        ``implicit.wesl``); and ``field_motion``.
         """
-        return {f"field_{name}": image.sampled() for name, image in self._images.items()}
+        assert self._motion is not None
+        images = {f"field_{name}": image.sampled() for name, image in self._images.items()}
+        return {**images, "field_motion": self._motion.read()}
+
+    # --- motion ---------------------------------------------------------------------------------------------------
+
+    def place(self, index: int, transform: NDArray[np.float64]) -> None:
+        """An object stands elsewhere from the next frame on."""
+        self._before.setdefault(index, self._placed[index])
+        self._placed[index] = transform
+        self.field.place(index, transform)
+
+    def update(self) -> None:
+        """Bring the device up to date, at the beginning of a frame."""
+        self.field.update()
+        if self._before or self._moves:
+            assert self._motion is not None
+            rows = self._still()
+            for index, before in self._before.items():
+                matrix = before @ np.linalg.inv(self._placed[index])
+                rows[index]["x"], rows[index]["y"], rows[index]["z"] = matrix[:3]
+            self._gpu.write(self._motion, rows)
+        self._moves = bool(self._before)
+        self._before.clear()
+
+    def _still(self) -> NDArray[Any]:
+        rows = np.zeros(len(self._placed), self._gpu.dtype(f"{MODULE}::Motion"))
+        rows["x"], rows["y"], rows["z"] = np.eye(4)[:3]
+        return rows
 
     # --- drawing --------------------------------------------------------------------------------------------------
 
@@ -170,7 +204,8 @@ class Fields:
     def resources(self) -> list[Resource]:
         """What is held on the device."""
         shade = [self._shade] if self._shade else []
-        return [*self.field.resources(), *self._images.values(), *self._maps.values(), *shade]
+        motion = [self._motion] if self._motion else []
+        return [*self.field.resources(), *motion, *self._images.values(), *self._maps.values(), *shade]
 
     def forget_bundles(self) -> None:
         """Free what a shadow technique was drawn from; the next one may need other images."""
@@ -185,6 +220,9 @@ class Fields:
         for image in self._images.values():
             image.destroy()
         self._images.clear()
+        if self._motion:
+            self._motion.destroy()
+            self._motion = None
         self.field.close()
 
 

@@ -264,6 +264,41 @@ def test_what_moves_leaves_no_trail(gpu: Gpu) -> None:
         assert renderer.radiance()[24, 48].min() > 3
 
 
+_MOTION = """
+    import package::wesl::motion::motion_of;
+    fn evaluate(x: vec4f) -> vec4f {
+        return vec4f(motion_of(vec2u(x.xy)), 0.0, 0.0);
+    }
+"""
+
+
+def test_an_objects_motion_is_told_from_that_of_the_camera(gpu: Gpu) -> None:
+    """It moved by 0.1 m at 2 m and turned about the view's axis; the wall behind it stood still."""
+    turn = np.array([[0, -1, 0, 0.1], [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1.0]])
+    ball = Implicit(sphere(0.3), at(0, 0, -2.0), WHITE, "ball")
+    scene = Scene([props.wall(-4)], camera=props.AHEAD, implicits=[ball])
+    pixels = np.array([(32, 24, 0, 0), (32, 20, 0, 0), (4, 4, 0, 0)], np.float32)
+    with Renderer(scene, (64, 48), gpu=gpu, **QUIET) as renderer:
+        renderer.draw()
+        renderer.move("ball", turn)
+        renderer.draw()
+        moved = props.evaluate(gpu, "motion_moved", _MOTION, pixels, renderer._scope)[:, :2]
+        renderer.draw()
+        still = props.evaluate(gpu, "motion_still", _MOTION, pixels, renderer._scope)[:, :2]
+    seen = props.rays(props.AHEAD, (64, 48)).directions
+    height = 2 * math.tan(props.AHEAD.fov / 2)
+    for row, (x, y) in zip(moved, ((32, 24), (32, 20)), strict=False):
+        d = seen[y, x]
+        off = np.array((0, 0, -2.0)) + (0.1, 0, 0)
+        along = d @ off
+        place = d * (along - math.sqrt(along**2 - off @ off + 0.09))
+        before = np.linalg.inv(turn) @ (*place, 1.0)
+        step = place[:2] / -place[2] - before[:2] / -before[2]
+        np.testing.assert_allclose(row, step / (height * 64 / 48, -height), atol=0.004)
+    np.testing.assert_array_equal(moved[2], 0)
+    np.testing.assert_array_equal(still, 0)
+
+
 def test_materials_are_found_in_all_parts() -> None:
     one, two = Material("one"), Material("two")
     shape = sphere(1).material(one) | sphere(2).at(1, 0, 0)

@@ -55,7 +55,7 @@ class Loop:
     pace: float = param(1.0, 0, 1, "share of the distance that a step goes: 1/L")
     reach: float = param(0.5, 1e-6, None, "how far ambient occlusion looks", unit="m")
     steps: int = param(256, 1, 65536, "of a ray, at most")
-    shadow_steps: int = param(128, 1, 65536, "of a ray to a light, at most")
+    shadow_steps: int = param(96, 1, 65536, "of a ray to a light, at most")
     shadows: int = param(1, 0, 1, "whether there are any")
     occlusion: int = param(1, 0, 1, "whether there is any")
     zero: int = param(0, 0, 0, "0, which the compiler must not know")
@@ -77,7 +77,7 @@ class Loop:
             "spread": float(np.tan(scene.camera.fov / 2)) / size[1],
             "least": 1e-5 * radius,
             "pace": 1 / max(1.0, *(shape.lipschitz for shape in shapes)),
-            "reach": 0.15 * radius,
+            "reach": scene.looks.get("field_ao", {}).get("radius", 1.0),
         }
         if len(finite) == len(ends):
             margin = 1e-3 * radius

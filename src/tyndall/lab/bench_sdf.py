@@ -3,14 +3,15 @@
 ``tyndall bench sdf`` measures, on one adapter and in one run:
 
 - **scenes**: ``portrait``, ``snail``, ``jumper`` and ``temple`` with shadows and ambient occlusion at 1920×1080, still
-  and in motion, for half a minute each: frames per second, GPU time by pass, host time; beside them the plain loop as a
-  fragment and as a compute shader (:mod:`tyndall.lab.baseline`), and S5's own numbers (:mod:`tyndall.lab.s5`);
-- **swarm**: 10 to 10,000 smooth-blended primitives, still and all moving, beside the loop as literal code, which cannot
-  move, and as a loop over an array, which can;
+  and in motion, for half a minute each: frames per second, GPU time by pass, host time; beside them S5's own numbers
+  (:mod:`tyndall.lab.s5`);
+- **swarm**: 10 to 10,000 smooth-blended primitives, still and all moving;
 - **edits**: host time to move a leaf, all leaves, or an object, among 10,000 primitives, and the bytes written for it;
 - **first**: the first picture in a process of its own, without and with what the driver keeps of earlier ones'
   pipelines, and in a program that draws already;
-- **agreement**: pruned cells against whole programs at a million random points, also after a move.
+- **agreement**: pruned cells against whole programs at a million random points, also after a move;
+- **loops**: the plain loop (:mod:`tyndall.lab.baseline`) in the same scenes and swarms, as a fragment and as a compute
+  shader: as literal code, which cannot move, and swarms as a loop over an array too, which can.
 
 Ours is the time of the whole frame: G-buffer, shadows, ambient occlusion, lighting, composite and tone mapping, in
 buffers that meshes, air and antialiasing share. The loop's is that of its one pass. Frames are drawn one at a time and
@@ -27,7 +28,7 @@ import dataclasses
 import json
 import os
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date
 from functools import partial
@@ -55,7 +56,7 @@ from tyndall.sdf.field import Field
 from tyndall.techniques import FAMILIES
 
 NAME = "sdf"
-PARTS = ("scenes", "swarm", "edits", "first", "agreement")
+PARTS = ("scenes", "swarm", "edits", "first", "agreement", "loops")
 FRAME: Mapping[str, str] = {
     "volumetric": "off",
     "shadow": "field",
@@ -99,15 +100,17 @@ class Settings:
 
 QUICK = Settings(
     size=(160, 90),
+    scenes=("jumper",),
     swarm=(10, 100),
     edited=100,
     first=("swarm:100",),
-    agreement=("snail", "swarm:100"),
+    agreement=("jumper", "swarm:100"),
     points=20_000,
     seconds=1.0,
     loop_seconds=1.0,
     frames=5,
     edits=5,
+    timeout=30.0,
 )
 
 
@@ -188,6 +191,29 @@ def sdf(
     return bench
 
 
+def join(documents: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Documents of several runs on one adapter, each of some parts, as one; of what several have, the last one's.
+
+    Raises:
+        ParameterError: none, or of several adapters.
+    """
+    if len({document["adapter"] for document in documents}) != 1:
+        raise ParameterError("documents: not of one adapter")
+    joined: dict[str, Any] = {}
+    for document in documents:
+        for key, value in document.items():
+            if key in ("scenes", "swarm") and key in joined:
+                rows = {row["scene"]: row for row in joined[key]}
+                for row in value:
+                    rows[row["scene"]] = {**rows.get(row["scene"], {}), **row}
+                joined[key] = list(rows.values())
+            elif key == "failed":
+                joined[key] = [*joined.get(key, []), *value]
+            else:
+                joined[key] = value
+    return joined
+
+
 class _Moving:
     """A renderer whose scene's own time goes on from frame to frame."""
 
@@ -212,6 +238,7 @@ class _Run:
         self._gpu, self._s, self._out = gpu, settings, out
         self._progress = progress or (lambda fraction, text: None)
         self._done, self._planned = 0, self._count()
+        self._held: tuple[str, Scene] | None = None
         self.document: dict[str, Any] = {
             "benchmark": NAME,
             "date": date.today().isoformat(),
@@ -230,12 +257,14 @@ class _Run:
 
     def _count(self) -> int:
         s = self._s
+        codes = [count for count in s.swarm if count <= _MOST_LITERAL]
         sizes = {
-            "scenes": 3 * len(s.scenes),
-            "swarm": 5 * len(s.swarm),
+            "scenes": len(s.scenes),
+            "swarm": len(s.swarm),
             "edits": 1,
             "first": len(s.first),
             "agreement": len(s.agreement),
+            "loops": 2 * (len(s.scenes) + len(s.swarm) + len(codes)),
         }
         return max(1, sum(sizes[part] for part in s.parts))
 
@@ -248,44 +277,56 @@ class _Run:
 
     def _scenes(self) -> None:
         for name in self._s.scenes:
-            row: Row = {"scene": name}
-            scene = self._tried(name, partial(open_scene, name))
-            if scene is None:
-                continue
-            row |= facts(scene)
-            self.document["scenes"].append(row)
-            self._ours(name, scene, row)
-            for stage in ("fragment", "compute"):
-                self._loop(f"{name}, {stage}", row.setdefault("loop", {}), stage, Order(name, stage), scene)
+            self._ours("scenes", name)
 
     def _swarm(self) -> None:
-        rows = self.document.setdefault("swarm", [])
         for count in self._s.swarm:
-            name = f"swarm:{count}"
-            scene = self._tried(name, partial(open_scene, name))
-            if scene is None:
-                continue
-            row: Row = {"scene": name, "count": count, **facts(scene)}
-            rows.append(row)
-            self._ours(name, scene, row)
-            for stage in ("fragment", "compute"):
-                key, order = row.setdefault("listed", {}), Order(name, stage, loops=True)
-                self._loop(f"{name} as a list, {stage}", key, stage, order, scene, isolated=False)
-                key, order = row.setdefault("loop", {}), Order(name, stage)
-                if count <= _MOST_LITERAL:
-                    self._loop(f"{name} as code, {stage}", key, stage, order, scene)
-                else:
-                    key[stage] = {"failed": f"not tried: {count:,} primitives as code"}
-                    self._step(f"{name} as code")
+            self._ours("swarm", f"swarm:{count}")
 
-    def _ours(self, name: str, scene: Scene, row: Row) -> None:
+    def _loops(self) -> None:
+        s = self._s
+        swarms = [f"swarm:{count}" for count in s.swarm]
+        codes = [f"swarm:{count}" for count in s.swarm if count <= _MOST_LITERAL]
+        for part, names in (("swarm", swarms), ("scenes", s.scenes), ("swarm", codes)):
+            listed = names is swarms
+            for name in names:
+                for stage in ("fragment", "compute"):
+                    self._loop(part, Order(name, stage, loops=listed))
+        for count in s.swarm:
+            if count > _MOST_LITERAL:
+                for stage in ("fragment", "compute"):
+                    reason = f"not tried: {count:,} as code"
+                    self._row("swarm", f"swarm:{count}").setdefault("loop", {})[stage] = {"failed": reason}
+
+    def _row(self, part: str, name: str) -> Row:
+        """The row of a scene, anew or as it is so far."""
+        rows = self.document.setdefault(part, [])
+        for row in rows:
+            if row["scene"] == name:
+                found: Row = row
+                return found
+        new: Row = {"scene": name, **({"count": int(name.partition(":")[2])} if part == "swarm" else {})}
+        rows.append(new)
+        return new
+
+    def _scene(self, name: str) -> Scene:
+        """A scene by its name; the last one is kept."""
+        if self._held is None or self._held[0] != name:
+            self._held = name, open_scene(name)
+        return self._held[1]
+
+    def _ours(self, part: str, name: str) -> None:
+        row = self._row(part, name)
+
         def found() -> Row:
+            scene = self._scene(name)
+            row.update(facts(scene))
             figures: Row = {}
             with Renderer(scene, self._s.size, gpu=self._gpu, **techniques()) as renderer:  # type: ignore[arg-type]
                 figures["still"] = self._measured(renderer, renderer)
                 figures["memory"] = renderer.memory()
                 figures["uploaded_still"] = renderer.uploaded
-                if getattr(scene, "motion", None) is not None:
+                if scene.motion is not None:
                     figures["moving"] = self._measured(renderer, _Moving(renderer))
                     figures["uploaded_moving"] = renderer.uploaded
             return figures
@@ -308,22 +349,24 @@ class _Run:
             "frames": taken.frames,
         }
 
-    def _loop(
-        self, text: str, into: Row, stage: str, order: Order, scene: Scene, *, isolated: bool | None = None
-    ) -> None:
-        s = self._s
-        apart = s.processes if isolated is None else isolated
+    def _loop(self, part: str, order: Order) -> None:
+        s, name = self._s, order.scene
         order = dataclasses.replace(
             order, size=s.size, seconds=s.loop_seconds, frames=s.frames, adapter=self.document["adapter"]
         )
+        row = self._row(part, name)
 
         def found() -> Row:
-            if apart:
+            scene = self._scene(name)
+            row.update(facts(scene))
+            if s.processes and not order.loops:
                 return in_a_process(order, timeout=s.timeout, keep_compiled=False)
             return run(order, self._gpu, scene)
 
+        text = f"{name} as {'a list' if order.loops else 'code'}, {order.who}"
         self._step(text)
-        into[stage] = self._tried(text, found) or {"failed": self._reason}
+        into = row.setdefault("listed" if order.loops else "loop", {})
+        into[order.who] = self._tried(text, found) or {"failed": self._reason}
         self._save()
 
     def _edits(self) -> None:
@@ -335,7 +378,7 @@ class _Run:
 
     def _edited(self, name: str) -> Row:
         """Host times of edits, each with the frame that shows it."""
-        scene, s = open_scene(name), self._s
+        scene, s = self._scene(name), self._s
         index = largest(scene)
         one = scene.implicits[index]
         shape: Any = one.shape
@@ -345,7 +388,7 @@ class _Run:
         joined = dataclasses.replace(one, shape=union(shape, leaf, smooth=0.0), name="the object")
         implicits = tuple(joined if i == index else other for i, other in enumerate(scene.implicits))
         scene = scene.with_(implicits=implicits)
-        motion: Any = getattr(scene, "motion", None)
+        motion = scene.motion
         rows: dict[str, Row] = {}
         with Renderer(scene, s.size, gpu=self._gpu, **techniques()) as renderer:  # type: ignore[arg-type]
             renderer.draw()
@@ -391,7 +434,7 @@ class _Run:
         for name in self._s.first:
             self._step(f"first picture of {name}")
             order = Order(name, size=self._s.size, adapter=self.document["adapter"], techniques=techniques())
-            scene = self._tried(name, partial(open_scene, name))
+            scene = self._tried(name, partial(self._scene, name))
             if scene is None:
                 continue
             row: Row = {"scene": name, **facts(scene)}
@@ -412,8 +455,8 @@ class _Run:
             self._save()
 
     def _agreed(self, name: str) -> Row:
-        scene, gpu = open_scene(name), self._gpu
-        motion: Any = getattr(scene, "motion", None)
+        scene, gpu = self._scene(name), self._gpu
+        motion = scene.motion
         with Field(gpu, scene.implicits) as field:
             still = agreement(gpu, field, scene.implicits, self._s.points)
             row: Row = {"scene": name, **facts(scene), "still": still.to_json()}

@@ -129,8 +129,8 @@ def _scenes(document: Document) -> str:
         rows.append(
             [
                 f"`{row['scene']}`",
-                f"{row['nodes']:,}",
-                str(row["objects"]),
+                f"{row.get('nodes', 0):,}",
+                str(row.get("objects", 0)),
                 *(_ms(frame_ms(figures)) for figures in states),
                 *(_ms(figures["host_ms"]["median"] if figures else None) for figures in states),
                 *(f"{figures['fps']:,.0f}" if figures else "–" for figures in states),

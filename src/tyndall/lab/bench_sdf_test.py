@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from tyndall.gpu.device import Gpu
 from tyndall.gpu.params import ParameterError
 from tyndall.lab import bench_sdf, bench_sdf_tables, first_picture
-from tyndall.lab.bench_sdf import SdfBench, Settings, frames_per_second, sdf
+from tyndall.lab.bench_sdf import SdfBench, Settings, frames_per_second, join, sdf
 from tyndall.lab.first_picture import Order, in_a_process, run
 from tyndall.scene.model import Camera, DirectionalLight, Implicit, Scene
 from tyndall.sdf import box, sphere, union
@@ -110,11 +110,22 @@ def test_what_fails_is_told_and_the_rest_goes_on(gpu: Gpu, monkeypatch: pytest.M
     monkeypatch.setattr(bench_sdf, "open_scene", broken)
     found = sdf(gpu, tmp_path, settings=dataclasses.replace(TINY, parts=("scenes", "edits", "agreement"))).to_json()
     assert [row["what"] for row in found["failed"]] == ["snail", "swarm:10", "swarm:10"]
+    assert found["scenes"] == [{"scene": "snail", "ours": {"failed": "ParameterError: no scene 'snail'"}}]
     text = SdfBench(found).markdown()
     assert "### Not measured" in text
     assert "no scene 'snail'" in text
     with pytest.raises(ParameterError, match="no part 'scene' — did you mean 'scenes'"):
         sdf(gpu, settings=dataclasses.replace(TINY, parts=("scene",)))
+
+
+def test_documents_of_several_runs_are_joined() -> None:
+    a = {"adapter": "A", "scenes": [{"scene": "x", "ours": 1}, {"scene": "y"}], "failed": [1], "edits": 1}
+    b = {"adapter": "A", "scenes": [{"scene": "x", "loop": 2}], "failed": [2], "edits": 2}
+    found = join([a, b])
+    assert found["scenes"] == [{"scene": "x", "ours": 1, "loop": 2}, {"scene": "y"}]
+    assert (found["failed"], found["edits"]) == ([1, 2], 2)
+    with pytest.raises(ParameterError, match="not of one adapter"):
+        join([a, {**b, "adapter": "B"}])
 
 
 def test_a_slow_loop_is_measured_smaller(gpu: Gpu, small: object, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -62,6 +62,8 @@ def compare(
     volumetric: Choice = None,
     shadow: Choice = None,
     occlusion: str | Technique | None = None,
+    reflection: str | Technique | None = None,
+    volume: str | Technique | None = None,
     antialiasing: str | Technique | None = None,
     tonemap: str | Technique | None = None,
     model: str | None = None,
@@ -85,7 +87,7 @@ def compare(
             less those that refuse the scene; of the other family one, or None for its default. Shadows are compared
             without the air unless a volumetric technique is asked for: what it asks a shadow technique about points in
             the air would be its time, and not the shadow technique's.
-        occlusion, antialiasing, tonemap: by name or ready made; None is the family's default.
+        occlusion, reflection, volume, antialiasing, tonemap: by name or ready made; None is the family's default.
         model: "physical", "paper" or "both", for volumetric techniques that have models; None leaves each as it is.
         parameters: by technique name, parameters to change: ``{"froxel": {"grid": (190, 90, 128)}}``.
         truth: what errors are against: "traced", "march", "mitsuba", a truth that is there already, or None for no
@@ -123,6 +125,8 @@ def compare(
     others = {
         fixed: beside,
         "occlusion": occlusion,
+        "reflection": reflection,
+        "volume": volume,
         "antialiasing": antialiasing,
         "tonemap": tonemap,
     }

@@ -17,6 +17,8 @@ def render(
     volumetric: str | Technique = "froxel",
     shadow: str | Technique | None = None,
     occlusion: str | Technique | None = None,
+    reflection: str | Technique | None = None,
+    volume: str | Technique | None = None,
     antialiasing: str | Technique | None = None,
     tonemap: str | Technique | None = None,
     parameters: Overrides | None = None,
@@ -28,8 +30,8 @@ def render(
 
     Args:
         size: width and height in pixels.
-        volumetric, shadow, occlusion, antialiasing, tonemap: a technique of each family, by name or ready made; None
-            is the family's default. One made by name starts from the scene's looks.
+        volumetric, shadow, occlusion, reflection, volume, antialiasing, tonemap: a technique of each family, by name or
+            ready made; None is the family's default. One made by name starts from the scene's looks.
         parameters: by technique name, parameters to change: ``{"froxel": {"grid": (190, 90, 128)}}``.
         frames: how many frames are drawn; temporal antialiasing gathers its samples from them.
         adapter: part of an adapter's name, or a device to share.
@@ -41,7 +43,14 @@ def render(
     """
     if frames < 1:
         raise ParameterError(f"frames: {frames} is fewer than 1")
-    others = {"shadow": shadow, "occlusion": occlusion, "antialiasing": antialiasing, "tonemap": tonemap}
+    others = {
+        "shadow": shadow,
+        "occlusion": occlusion,
+        "reflection": reflection,
+        "volume": volume,
+        "antialiasing": antialiasing,
+        "tonemap": tonemap,
+    }
     with Stage(scene, size, parameters=parameters, adapter=adapter, seed=seed, **others) as stage:
         technique = make("volumetric", volumetric, scene, parameters)
         renderer = stage.use(technique)

@@ -91,8 +91,8 @@ class Stage(Closing):
 
     Args:
         adapter: part of an adapter's name, or a device to share; a shared one is left open.
-        volumetric, shadow, occlusion, antialiasing, tonemap: techniques by name, ready made, or None for the family's
-            default; ``techniques`` has them by family.
+        volumetric, shadow, occlusion, reflection, volume, antialiasing, tonemap: techniques by name, ready made, or
+            None for the family's default; ``techniques`` has them by family.
 
     Raises:
         GpuError: no such adapter, or a size beyond its limits.
@@ -107,6 +107,8 @@ class Stage(Closing):
         volumetric: str | Technique | None = None,
         shadow: str | Technique | None = None,
         occlusion: str | Technique | None = None,
+        reflection: str | Technique | None = None,
+        volume: str | Technique | None = None,
         antialiasing: str | Technique | None = None,
         tonemap: str | Technique | None = None,
         parameters: Overrides | None = None,
@@ -122,6 +124,8 @@ class Stage(Closing):
             "volumetric": volumetric,
             "shadow": shadow,
             "occlusion": occlusion,
+            "reflection": reflection,
+            "volume": volume,
             "antialiasing": antialiasing,
             "tonemap": tonemap,
         }

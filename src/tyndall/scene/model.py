@@ -287,6 +287,12 @@ class Material(_Checked):
     alpha_mode: Literal["opaque", "mask"] = param("opaque", doc="mask: texels below the cutoff are holes")
     alpha_cutoff: float = param(0.5, 0, 1, "alpha below this is a hole")
     double_sided: bool = param(False, doc="lit from both sides; no back-face culling")
+    reflections: bool = param(False, doc="shows what is around as a polished surface does; of implicit surfaces")
+    transmission: float = param(0.0, 0, 1, "part of what a dielectric does not reflect that passes; implicit surfaces")
+    ior: float = param(1.5, 1, 4, "index of refraction, against that of the air")
+    attenuation_distance: float = param(
+        1.0, 1e-6, None, "way inside after which the base colour is left of white light", unit="m"
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -446,6 +452,40 @@ class Implicit:
         return world.min(axis=0), world.max(axis=0)
 
 
+@dataclass(frozen=True, eq=False)
+class Volume:
+    """A cloud: a medium that fills the inside of an implicit surface, which itself is not seen.
+
+    Attributes:
+        shape: signed distances in its own space, a :class:`tyndall.sdf.Shape` of three dimensions, with an end.
+        medium: what scatters and absorbs there; its ``bounds`` do not count.
+        transform: 4×4 affine (row-major, column vectors: p' = M·p) from its own space to the world.
+        edge: how far inside of the surface the medium reaches its whole density, in metres; 0 is a sharp edge.
+        name: of no consequence.
+
+    Raises:
+        ParameterError: a flat shape or one without an end, a transform that has no inverse, or a negative edge.
+    """
+
+    shape: Solid
+    medium: Medium
+    transform: Mat4 = IDENTITY
+    edge: float = 0.0
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "transform", self.surface.transform)
+        if self.surface.bounds is None:
+            raise ParameterError("shape: it has no end; a volume must")
+        if not 0 <= self.edge < math.inf:
+            raise ParameterError(f"edge: {self.edge} is no width")
+
+    @cached_property
+    def surface(self) -> Implicit:
+        """Where the medium ends."""
+        return Implicit(self.shape, self.transform, name=self.name)
+
+
 @dataclass(frozen=True)
 class Camera(_Checked):
     """A pinhole camera with an infinite far plane."""
@@ -496,6 +536,7 @@ class Scene:
     implicits: tuple[Implicit, ...] = ()
     motion: Motion | None = None
     room: tuple[Vec3, Vec3] | None = param(None, doc="lower and upper corner of all that moves", unit="m")
+    volumes: tuple[Volume, ...] = ()
 
     def __post_init__(self) -> None:
         check(self)
@@ -504,7 +545,13 @@ class Scene:
         object.__setattr__(self, "instances", tuple(self.instances))
         object.__setattr__(self, "lights", tuple(self.lights))
         object.__setattr__(self, "implicits", tuple(self.implicits))
-        kinds_of = {"instances": (Instance,), "lights": get_args(Light), "implicits": (Implicit,)}
+        object.__setattr__(self, "volumes", tuple(self.volumes))
+        kinds_of = {
+            "instances": (Instance,),
+            "lights": get_args(Light),
+            "implicits": (Implicit,),
+            "volumes": (Volume,),
+        }
         for name, kinds in kinds_of.items():
             for index, item in enumerate(getattr(self, name)):
                 if not isinstance(item, kinds):
@@ -533,7 +580,7 @@ class Scene:
             world = box_corners(low, high) @ matrix[:3, :3].T + matrix[:3, 3]
             lows.append(world.min(axis=0))
             highs.append(world.max(axis=0))
-        for implicit in self.implicits:
+        for implicit in (*self.implicits, *(volume.surface for volume in self.volumes)):
             if implicit.bounds is not None:
                 lows.append(implicit.bounds[0])
                 highs.append(implicit.bounds[1])

@@ -20,18 +20,20 @@ of primitives that are in use.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from tyndall.gpu.device import ComputePass, Gpu
+from tyndall.gpu.params import ParameterError, nearest
 from tyndall.gpu.resources import Buffer, Closing, ParamsBuffer, Resource
-from tyndall.scene.model import Implicit
+from tyndall.scene.model import Implicit, Material
 from tyndall.sdf.marching import Marching
-from tyndall.sdf.program import Kinds, Program, compile_shape
+from tyndall.sdf.program import TURNED, Kinds, Leaf, Part, Program, compile_shape
+from tyndall.sdf.shading import Shadings
 from tyndall.sdf.shape import Box, Floats
 from tyndall.sdf.snippets import validate
 
@@ -43,6 +45,8 @@ _PRUNE = "package::sdf::prune"
 _MARGIN = 0.02  # of its longest side, around an object's box
 _DIVIDED = 4  # a program of more instructions has cells
 _COARSE, _FINE = 16, 64  # cells along the longest side, of both levels
+_SPARE = 0.1  # of its longest side, by which an object's box grows beyond what it must hold
+_LEAF_SLOTS = 7  # of a leaf with a name
 _COUNTERS = 8  # of an object: entries used, overflows, words of marks used at each level
 _LEAST_ENTRIES, _MOST_ENTRIES = 1 << 12, 1 << 23
 _PART_SIZE = 4096  # instructions for which one part is enough
@@ -51,6 +55,61 @@ _LONGEST = 32 * 1024  # of those; beyond, cells walk all of it; as in prune.wesl
 _SEGMENT = 256  # of them, as in prune.wesl
 _FEW_MARKS = 128  # instructions whose marks need no memory; as in prune.wesl
 _MOST_MARKS = 1 << 23  # words
+
+
+@dataclass(frozen=True, eq=False)
+class _Parts:
+    """The parts of one name in an object, as arrays over them; a copy of a part is one more of the same number."""
+
+    name: str
+    count: int
+    numbers: NDArray[np.intp]
+    slots: NDArray[np.intp]
+    entries: NDArray[np.intp]
+    leaves: NDArray[np.intp]
+    before: Floats
+    after: Floats
+    factors: Floats
+    is_straight: bool
+
+    @classmethod
+    def of(cls, name: str, parts: Sequence[Part]) -> _Parts:
+        def integers(values: Iterable[int]) -> NDArray[np.intp]:
+            return np.array(list(values), np.intp)
+
+        before, after = np.array([p.before for p in parts]), np.array([p.after for p in parts])
+        linear = np.concatenate([before[:, :3, :3], after[:, :3, :3]])
+        numbers = integers(p.number for p in parts)
+        return cls(
+            name,
+            int(numbers.max()) + 1,
+            numbers,
+            integers(p.slot for p in parts),
+            integers(p.entry for p in parts),
+            integers(p.leaf for p in parts),
+            before,
+            after,
+            np.array([p.factor for p in parts]),
+            bool((linear == np.eye(3)).all()),
+        )
+
+
+def _matrices(given: Floats) -> Floats:
+    """(N, 4, 4) of transforms, or of (N, 3) ways."""
+    if given.ndim == 3:
+        return given
+    made = np.tile(np.eye(4), (len(given), 1, 1))
+    made[:, :3, 3] = given
+    return made
+
+
+def _least_stretches(linear: Floats) -> Floats:
+    """(N,) least singular values of (N, 3, 3); 1 of turns, without a decomposition."""
+    turns = np.abs(np.einsum("nji,njk->nik", linear, linear) - np.eye(3)).max(axis=(1, 2)) < 1e-9
+    stretches = np.ones(len(linear))
+    if not turns.all():
+        stretches[~turns] = np.linalg.svd(linear[~turns], compute_uv=False)[:, -1]
+    return stretches
 
 
 @dataclass(eq=False)
@@ -69,6 +128,16 @@ class _Object:
     box: Box
     dirty: bool = True
     moves: dict[str, Floats] = dataclasses.field(default_factory=dict)
+    parts: dict[str, _Parts] = dataclasses.field(default_factory=dict)
+    halves: Floats | None = None  # of the leaves' boxes in their own spaces, and their middles
+    middles: Floats = dataclasses.field(default_factory=lambda: np.zeros((0, 3)))
+
+    def __post_init__(self) -> None:
+        self.placements = np.array([leaf.placement for leaf in self.program.leaves])
+
+    def leaves(self) -> list[tuple[Leaf, float]]:
+        """The leaves, each with what its values are multiplied by."""
+        return [(leaf, float(self.program.slots[leaf.slot, 3])) for leaf in self.program.leaves]
 
     @property
     def cells(self) -> int:
@@ -104,7 +173,7 @@ class Field(Closing):
     ) -> None:
         self._gpu, self._owner, self._pruning = gpu, owner, pruning
         self._marching = marching or Marching()
-        self._kinds = Kinds()
+        self._kinds, self._shadings = Kinds(), Shadings()
         self._buffers: list[Buffer] = []
         self._params: ParamsBuffer | None = None
         self._objects: list[_Object] = []
@@ -139,12 +208,20 @@ class Field(Closing):
             words, slots = words + program.size, slots + len(program.slots)
             materials += 1 + len(program.materials)
             cells, entries = cells + made.cells, entries + made.capacity
+        listed = [m for o in self._objects for m in (o.implicit.material, *o.program.materials)]
+        shaded = [self._shadings.of(m) for m in listed]
         for source in self._kinds.sources():
             validate(gpu, source)
+        self._shadings.validate(gpu)
         for made in self._objects:
             made.first_entry += words
         self._words = np.concatenate([np.zeros((0, 2), np.uint32), *(self._placed_words(o) for o in self._objects)])
-        self._slots = np.concatenate([np.zeros((1, 4), np.float32), *(self._placed_slots(o) for o in self._objects)])
+        numbers = self._shadings.numbers  # in rows after all slots
+        rows = np.zeros((-(-len(numbers) // 4), 4), np.float32)
+        rows.reshape(-1)[: len(numbers)] = numbers
+        first_number = 4 * (1 + slots)
+        placed = [self._placed_slots(o) for o in self._objects]
+        self._slots = np.concatenate([np.zeros((1, 4), np.float32), *placed, rows])
         self._rows = np.zeros(max(1, len(self._objects)), gpu.dtype(_OBJECT))
         self._object_buffer = self._buffer("objects", self._rows, _OBJECT)
         self._slot_buffer = self._buffer("slots", self._slots, "vec4f")
@@ -165,7 +242,7 @@ class Field(Closing):
         self._span_buffer = self._buffer("spans", spans, "vec2u")
         most_jobs = sum(o.levels + o.program.size // _PART_SIZE for o in self._objects)
         self._job_buffer = self._buffer("jobs", self._gpu.dtype(_JOB).itemsize * max(1, most_jobs), _JOB)
-        self._material_buffer = self._buffer("materials", self._materials(), _MATERIAL)
+        self._material_buffer = self._buffer("materials", self._materials(listed, shaded, first_number), _MATERIAL)
         self._params = gpu.params(f"{self._owner}.marching", self._marching, owner=self._owner)
         self._write(self._list_buffer, self._words)
         for index in range(len(self._objects)):
@@ -192,12 +269,15 @@ class Field(Closing):
         slots[rows[named], 2] += made.first_material + 1
         return slots
 
-    def _materials(self) -> NDArray[Any]:
-        listed = [m for o in self._objects for m in (o.implicit.material, *o.program.materials)]
+    def _materials(
+        self, listed: Sequence[Material], shaded: Sequence[tuple[int, int]], first_number: int
+    ) -> NDArray[Any]:
         rows = np.zeros(max(1, len(listed)), self._gpu.dtype(_MATERIAL))
-        for row, m in zip(rows, listed, strict=False):
+        for row, m, (shader, at) in zip(rows, listed, shaded, strict=False):
             row["base_color"], row["emissive"] = m.base_color[:3], m.emissive
             row["metallic"], row["roughness"] = m.metallic, m.roughness
+            row["shader"], row["numbers"], row["lit"] = shader + 1, first_number + at, getattr(m, "lit", True)
+            row["clear"] = m.reflections, m.transmission, m.ior, m.attenuation_distance
         return rows
 
     def _bind(self) -> dict[str, Any]:
@@ -207,7 +287,16 @@ class Field(Closing):
             "IMPLICIT_VALUES": max([1, *(p.values for p in programs)]),
             "IMPLICIT_PLACES": max([1, *(p.places for p in programs)]),
         }
-        text = "\n".join([*(f"const {name} = {n}u;" for name, n in constants.items()), self._kinds.wesl()])
+        shaded = str(not self._shadings.is_trusted).lower()
+        text = "\n".join(
+            [
+                *(f"const {name} = {n}u;" for name, n in constants.items()),
+                f"const IMPLICIT_SHADED = {shaded};",
+                "fn implicit_number(i: u32) -> f32 { return implicit_slots[i >> 2u][i & 3u]; }",
+                self._kinds.wesl(),
+                self._shadings.wesl(),
+            ]
+        )
         assert self._params is not None
         return {
             "implicit_objects": self._object_buffer.read().telling(text, untrusted=not self.is_trusted),
@@ -246,15 +335,146 @@ class Field(Closing):
             row["first_cell"] = made.first_cell + (_COARSE**3 if made.levels > 1 else 0)
         self._write(self._object_buffer, self._rows[index : index + 1], index * self._rows.itemsize)
 
+    # --- motion ---
+
     def place(self, index: int, transform: Any) -> None:
         """An object stands elsewhere: one write, and nothing is pruned again."""
         made = self._objects[index]
         made.implicit = dataclasses.replace(made.implicit, transform=transform)
         self._describe(index)
 
-    def move(self, name: str, matrices: Any) -> None:
-        """Parts of a name are moved."""
-        raise NotImplementedError
+    def move(self, name: str, matrices: ArrayLike) -> None:
+        """The parts of a name are moved from where they stand at rest, in the space that holds them.
+
+        Only their numbers are written, and only the objects that they are in are pruned again, by :meth:`update`.
+
+        Args:
+            matrices: (N, 4, 4) transforms or (N, 3) ways in metres, for the N parts of that name in order.
+
+        Raises:
+            ParameterError: no such name, another number of transforms, or one that has no inverse.
+        """
+        given = np.asarray(matrices, np.float64)
+        sets = self._parts(name)
+        count = sum(parts.count for _, parts in sets)
+        if given.shape not in ((count, 3), (count, 4, 4)):
+            raise ParameterError(f"{name}: shape {given.shape} is neither ({count}, 4, 4) nor ({count}, 3)")
+        if not np.isfinite(given).all():
+            raise ParameterError(f"{name}: a transform is not finite")
+        first = 0
+        for made, parts in sets:
+            self._move(made, parts, given[first : first + parts.count])
+            first += parts.count
+
+    def _parts(self, name: str) -> list[tuple[_Object, _Parts]]:
+        found = []
+        for made in self._objects:
+            if name in made.program.names:
+                if name not in made.parts:
+                    made.parts[name] = _Parts.of(name, made.program.names[name])
+                found.append((made, made.parts[name]))
+        if not found:
+            known = sorted({name for made in self._objects for name in made.program.names})
+            raise ParameterError(f"no part '{name}'{nearest(name, known)}")
+        return found
+
+    def _move(self, made: _Object, parts: _Parts, given: Floats) -> None:
+        moves = given[parts.numbers]
+        slots = made.first_slot + 1 + parts.slots
+        leaves = parts.leaves >= 0
+        if moves.ndim == 2 and parts.is_straight and leaves.all():
+            places = parts.before[:, :3, 3] + moves + parts.after[:, :3, 3]
+            self._slots[slots, :3] = places
+            turned = np.zeros(len(slots), bool)
+            made.placements[parts.leaves, :3, 3] = places
+            made.placements[parts.leaves, :3, :3] = np.eye(3)
+        else:
+            if moves.ndim == 2:
+                ways, moves = moves, np.tile(np.eye(4), (len(moves), 1, 1))
+                moves[:, :3, 3] = ways
+            placed = parts.before @ moves @ parts.after
+            stretch = _least_stretches(moves[:, :3, :3])
+            if (stretch < 1e-9).any():
+                raise ParameterError("matrices: a transform that has no inverse")
+            rows = np.linalg.inv(placed)[:, :3].astype(np.float32)
+            factors = parts.factors * stretch
+            turned = (np.abs(placed[:, :3, :3] - np.eye(3)) > 1e-12).any(axis=(1, 2))
+            own = slots[leaves]
+            self._slots[own, :3] = placed[leaves, :3, 3]
+            self._slots[own, 3] = factors[leaves]
+            for row in range(3):
+                self._slots[own + 4 + row] = rows[leaves, row]
+                self._slots[slots[~leaves] + row] = rows[~leaves, row]
+            self._slots[slots[~leaves] + 3, 0] = factors[~leaves]
+            made.placements[parts.leaves[leaves]] = placed[leaves]
+        entries = made.first_word + parts.entries[leaves]
+        flags = np.where(turned[leaves], self._words[entries, 0] | TURNED, self._words[entries, 0] & ~np.uint32(TURNED))
+        if (flags != self._words[entries, 0]).any():
+            self._words[entries, 0] = flags
+            low, high = int(entries.min()), int(entries.max()) + 1
+            self._write(self._list_buffer, self._words[low:high], 8 * low)
+        low, high = int(slots.min()), int(slots.max()) + _LEAF_SLOTS
+        self._write(self._slot_buffer, self._slots[low:high], 16 * low)
+        made.moves[parts.name] = given
+        self._fit(made)
+        made.dirty = True
+
+    def _fit(self, made: _Object) -> None:
+        """Let the object's box hold it where its parts are now; its cells stay as they are while they do."""
+        if made.program.margin >= 0:
+            low, high = self._hull(made)
+        else:
+            moves = {name: iter(_matrices(given)) for name, given in made.moves.items()}
+            shape: Any = made.implicit.shape
+            low, high = shape.moved(moves).box
+        if (low >= made.box[0]).all() and (high <= made.box[1]).all():
+            return
+        spare = _SPARE * np.max(np.maximum(high, made.box[1]) - np.minimum(low, made.box[0]))
+        lower = np.where(low < made.box[0], low - spare, made.box[0])
+        upper = np.where(high > made.box[1], high + spare, made.box[1])
+        made.box = lower, upper
+        self._describe(self._objects.index(made))
+
+    def _hull(self, made: _Object) -> Box:
+        """The box of all leaves, where nothing but unions is above them."""
+        if made.halves is None:
+            boxes = np.array([leaf.shape.extent(leaf.margin / factor) for leaf, factor in made.leaves()])
+            made.halves = 0.5 * (boxes[:, 1] - boxes[:, 0])
+            made.middles = 0.5 * (boxes[:, 1] + boxes[:, 0])
+        linear = made.placements[:, :3, :3]
+        if (linear == np.eye(3)).all():
+            middles, halves = made.middles + made.placements[:, :3, 3], made.halves
+        else:
+            middles = np.einsum("nij,nj->ni", linear, made.middles) + made.placements[:, :3, 3]
+            halves = np.einsum("nij,nj->ni", np.abs(linear), made.halves)
+        return (middles - halves).min(axis=0), (middles + halves).max(axis=0)
+
+    def edit(self, name: str, **changes: Any) -> None:
+        """Change parameters of the primitives of a name: ``edit("ball", radius=0.3)``. A few numbers are written.
+
+        Raises:
+            ParameterError: no such name, a part that is no primitive, or a value that it does not allow.
+        """
+        for made, parts in self._parts(name):
+            if (parts.leaves < 0).any():
+                raise ParameterError(f"{name}: is more than one primitive, and has no parameters")
+            for index, slot in zip(parts.leaves.tolist(), parts.slots.tolist(), strict=True):
+                leaf = made.program.leaves[index]
+                unknown = [key for key in changes if key not in {f.name for f in dataclasses.fields(leaf.shape)}]
+                if unknown:
+                    raise ParameterError(f"{name}: a {type(leaf.shape).__name__} has no {unknown[0]}")
+                shape: Any = dataclasses.replace(leaf.shape, **changes)
+                made.program.leaves[index] = dataclasses.replace(leaf, shape=shape)
+                numbers = np.zeros(8, np.float32)
+                numbers[: len(shape.numbers)] = shape.numbers
+                at = made.first_slot + 1 + slot
+                self._slots[at + 1 : at + 3] = numbers.reshape(2, 4)
+                self._slots[at + 3, 1] *= shape.lipschitz / leaf.shape.lipschitz
+                self._write(self._slot_buffer, self._slots[at + 1 : at + 4], 16 * (at + 1))
+            made.halves = None
+            if made.program.margin >= 0:
+                self._fit(made)
+            made.dirty = True
 
     def _jobs(self, index: int) -> list[Any]:
         """The divisions of an object, the coarse one first, each in as many parts as the marks take."""
@@ -343,7 +563,7 @@ class Field(Closing):
     @property
     def is_trusted(self) -> bool:
         """Whether no user's code is in it."""
-        return self._kinds.is_trusted
+        return self._kinds.is_trusted and self._shadings.is_trusted
 
     @property
     def size(self) -> int:

@@ -6,19 +6,25 @@ as an expression.
 
 from __future__ import annotations
 
+import itertools
 from typing import Any
 
 import numpy as np
+import props
 import pytest
-from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import HealthCheck, Phase, assume, given, settings
 from hypothesis import strategies as st
 
+from tyndall.gpu.device import Gpu
 from tyndall.gpu.params import ParameterError, fields_of
+from tyndall.scene.model import Implicit
 from tyndall.sdf import PROFILES, SOLIDS, Grid, Shape, from_mesh, intersection, sphere, subtraction, union
+from tyndall.sdf.field import Field
+from tyndall.sdf.program import Kinds, compile_shape
 from tyndall.sdf.shape import Primitive
 
 _SETTINGS = settings(
-    max_examples=150,
+    max_examples=100,
     deadline=None,
     derandomize=True,
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.filter_too_much],
@@ -184,3 +190,49 @@ def test_profiles(shape: Shape, seed: int) -> None:
 def test_every_primitive_by_itself(kind: str) -> None:
     """With its defaults, so that none is left out."""
     check_shape({**SOLIDS, **PROFILES}[kind](), 3)
+
+
+_names = (f"test_fuzz_{i}" for i in itertools.count())
+VALUES = """
+    import package::bindings::implicit_objects;
+    import package::sdf::interpreter::evaluate as whole;
+    import package::sdf::objects::bound_at;
+    fn evaluate(x: vec4f) -> vec4f {
+        let object = implicit_objects[u32(x.w)];
+        let bound = bound_at(object, x.xyz);
+        return vec4f(whole(object.begin, object.count, x.xyz), bound.value, bound.lipschitz, 0.0);
+    }
+"""
+
+
+def _has_program(shape: Shape) -> bool:
+    try:
+        compile_shape(shape, Kinds())
+    except ParameterError:
+        return False
+    return shape.count < 60 and shape.lipschitz < 100
+
+
+@settings(_SETTINGS, max_examples=1, phases=(Phase.generate,))
+@given(shapes=st.lists(solid().filter(_has_program), min_size=12, max_size=12))
+def test_the_device_has_the_same_values_whole_and_in_cells(gpu: Gpu, shapes: list[Shape]) -> None:
+    """Whole programs have the values of numpy. In its cells a value is the same, or of the same sign and less."""
+    rng = np.random.default_rng(6)
+    rows = []
+    for index, shape in enumerate(shapes):
+        low, high = (np.clip(corner, -3, 3) for corner in shape.box)
+        places = rng.uniform(low, np.maximum(high, low), (400, 3))
+        rows.append(np.concatenate([places, np.full((400, 1), index)], axis=1))
+    inputs = np.concatenate(rows).astype(np.float32)
+    with Field(gpu, [Implicit(shape) for shape in shapes]) as field:
+        field.update()
+        found = props.evaluate(gpu, next(_names), VALUES, inputs, field.bindings).reshape(len(shapes), 400, 4)
+    for shape, given_rows, values in zip(shapes, inputs.reshape(len(shapes), 400, 4), found, strict=True):
+        expected = shape(given_rows[:, :3])
+        whole, part, slope = values[:, :3].T
+        tolerance = 2e-5 * max(1.0, shape.lipschitz) * (1 + np.abs(given_rows[:, :3]).max()) + 1e-4 * np.abs(expected)
+        assert (np.abs(whole - expected) <= tolerance).all(), (shape, np.abs(whole - expected).max())
+        assert (np.abs(part) <= np.abs(expected) + tolerance).all(), (shape, "more than the value")
+        apart = np.abs(expected) > tolerance
+        assert (np.sign(part) * np.sign(expected) >= 0)[apart].all(), (shape, "of another sign")
+        assert (slope <= shape.lipschitz * 1.001).all(), shape

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import props
@@ -12,7 +13,7 @@ import pytest
 from tyndall.gpu.device import Gpu
 from tyndall.gpu.params import ParameterError
 from tyndall.scene.model import Implicit, Mesh
-from tyndall.sdf import Grid, Shape, Y, box, from_mesh, sphere, union
+from tyndall.sdf import Grid, Shape, Y, box, from_mesh, load, save, sphere, union
 from tyndall.sdf.field import Field
 from tyndall.sdf.grid import Triangles
 
@@ -160,6 +161,12 @@ def test_it_is_saved_as_plain_data_and_is_equal_then() -> None:
         with pytest.raises(ParameterError) as error:
             Grid.from_data({**grid.to_data(), **change})
         assert "\n" not in str(error.value)
+
+
+def test_it_is_in_files_of_shapes(tmp_path: Path) -> None:
+    shape = bowl().at(0.5) - sphere(0.4).at(1)
+    save(shape, tmp_path / "bowl.json")
+    assert load(tmp_path / "bowl.json") == shape
 
 
 def test_one_line_says_what_is_wrong() -> None:

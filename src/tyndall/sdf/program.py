@@ -18,15 +18,15 @@ program where some nodes do not matter is a part of it in the same order, with a
 
 Slots, in vec4f; ``k`` is the width of a smooth join, ``L`` the Lipschitz bound of the value in the object's space:
 
-- LEAF: ``(translation, factor) (a) (b) (k, L, material or −1, margin)``, and where it may be turned the three rows of the
-  transform from the object's to the leaf's space. The translation is subtracted; the rows hold theirs themselves.
+- LEAF: ``(translation, factor) (a) (b) (k, L, material or −1, margin)``, and where it may be turned the three rows of
+  the transform from the object's to the leaf's space. The translation is subtracted; the rows hold theirs themselves.
 - COMBINE: ``(k, L, −, −)``.
 - ENTER and LEAVE of a modifier: ``(a) (b) (−, L, −, −)``; of an affine transform (code AFFINE) ``(row) (row) (row)
   (factor, L, −, −)``.
 
 A leaf that only unions lie above has a *margin* ≥ 0, others −1: where its value is above that of the whole by more than
-the margin, it does not matter. A smooth union of width k is at least a − k where a still matters, so the margin is the sum of k over
-the unions above (and what takes its place for the other blends).
+the margin, it does not matter. A smooth union of width k is at least a − k where a still matters, so the margin is the
+sum of k over the unions above (and what takes its place for the other blends).
 
 Affine transforms are multiplied into the leaves below, except around what changes places by itself and around parts
 with a name, which move as one.
@@ -34,8 +34,9 @@ with a name, which move as one.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -44,6 +45,7 @@ from numpy.typing import NDArray
 
 from tyndall.gpu.params import ParameterError
 from tyndall.scene.model import Material
+from tyndall.sdf.repetition import Repetition
 from tyndall.sdf.shape import (
     Combination,
     Floats,
@@ -99,8 +101,8 @@ class Kinds:
         return not self.sources()
 
     def wesl(self) -> str:
-        """Text for the bindings module: ``implicit_primitive``, its numbers in the slots or given, ``implicit_enter`` and
-        ``implicit_leave``.
+        """Text for the bindings module: ``implicit_primitive``, its numbers in the slots or given, ``implicit_enter``
+        and ``implicit_leave``.
         """
         leaf, leaf_of, enter, leave, texts = [], [], [], [], []
         for code, shape in self._primitives.values():
@@ -143,12 +145,24 @@ def _payload(shape: Primitive) -> NDArray[np.float32] | None:
     return getattr(shape, "payload", None)
 
 
+_CASES = 32  # of one switch: Mesa's software adapter makes a nest of them, and gives zeros below 80 levels
+
+
 def _switch(signature: str, cases: Sequence[tuple[int, str]], otherwise: str) -> str:
-    lines = [f"case {code}u: {{ return {value}; }}" for code, value in cases]
-    body = (
-        f"switch code {{ {' '.join(lines)} default: {{ return {otherwise}; }} }}" if cases else f"return {otherwise};"
-    )
-    return f"fn {signature} {{ {body} }}"
+    """A function of ``code``, whose cases are numbered from 0 but for gaps: one switch, or one of several of them."""
+    if len(cases) <= _CASES:
+        lines = [f"case {code}u: {{ return {value}; }}" for code, value in cases]
+        body = f"switch code {{ {' '.join(lines)} default: {{ return {otherwise}; }} }}"
+        return f"fn {signature} {{ {body if cases else f'return {otherwise};'} }}"
+    name, arguments = signature.partition("(")[::2]
+    names = ", ".join(part.partition(":")[0].strip() for part in arguments.partition(")")[0].split(","))
+    texts, calls = [], []
+    for i in range(0, len(cases), _CASES):
+        texts.append(_switch(f"{name}_{i // _CASES}({arguments}", cases[i : i + _CASES], otherwise))
+        calls.append(
+            f"if code <= {cases[min(i + _CASES, len(cases)) - 1][0]}u {{ return {name}_{i // _CASES}({names}); }}"
+        )
+    return "\n".join([*texts, f"fn {signature} {{ {' '.join(calls)} return {otherwise}; }}"])
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,22 +170,31 @@ class Part:
     """A named part: where its place is in the slots, and what it is placed by, before and after its own motion.
 
     Attributes:
+        number: its place among the parts of its name, parts before their own parts; copies of one part share it.
         slot: the first vec4f of its leaf or its transform.
-        entry: its instruction, and that of the LEAVE of a transform; −1 for a leaf.
-        leaf: whether it is one leaf.
+        entry: its instruction.
+        leaf: its number among the leaves; −1: it is more than one, and has a transform of its own.
         before, after: 4×4, from its parent's space to the object's (or the scope's), and from its own to its parent's.
         factor: distances at rest, of the leaf or the transform.
-        shape: what is placed, a leaf's primitive among it.
     """
 
+    number: int
     slot: int
     entry: int
-    leave: int
-    leaf: bool
+    leaf: int
     before: Floats
     after: Floats
     factor: float
-    shape: Shape
+
+
+@dataclass(frozen=True, eq=False)
+class Leaf:
+    """A leaf of a program: where its numbers are, what it is, and from where it is placed."""
+
+    slot: int
+    shape: Primitive
+    placement: Floats
+    margin: float
 
 
 @dataclass(eq=False)
@@ -181,7 +204,8 @@ class Program:
     Attributes:
         words: (n, 2) uint32, its instructions; slots are numbered from 0.
         slots: (m, 4) float32.
-        names: the parts of each name, in the order in which they appear.
+        names: the parts of each name.
+        leaves: in the order of their instructions.
         materials: in the order of their numbers in the slots.
         values: the deepest stack of values.
         places: the deepest stack of places.
@@ -194,6 +218,7 @@ class Program:
     words: NDArray[np.uint32]
     slots: NDArray[np.float32]
     names: Mapping[str, list[Part]]
+    leaves: list[Leaf]
     materials: list[Material]
     values: int
     places: int
@@ -252,6 +277,8 @@ class _Context:
     name: str = ""
     before: Floats | None = None  # of the name: the transform around it
     margin: float = 0.0
+    order: Mapping[str, int] = field(default_factory=dict)  # of the names, the next part's number
+    number: int = 0  # of the part that the name is for
 
     @property
     def is_placed(self) -> bool:
@@ -265,6 +292,8 @@ class _Compiler:
         self._rows: list[Any] = []
         self._payloads: dict[int, tuple[int, Any]] = {}
         self._names: dict[str, list[Part]] = {}
+        self._named_in: dict[int, Counter[str]] = {}
+        self._leaves: list[Leaf] = []
         self._materials: dict[int, tuple[int, Material]] = {}
         self._depth = self._places = self._deepest = self._most_places = 0
         self._material_rows: list[int] = []
@@ -281,6 +310,7 @@ class _Compiler:
             np.array(self._words, np.uint32).reshape(-1, 2),
             np.array(self._rows, np.float32).reshape(-1, 4),
             self._names,
+            self._leaves,
             [material for _, material in self._materials.values()],
             self._deepest,
             self._most_places,
@@ -296,11 +326,15 @@ class _Compiler:
         match shape:
             case Painted():
                 self._emit(shape.shape, replace(c, material=shape.surface), join, blend, k)
-            case Named() if not _is_leaf(shape.shape):
-                self._scope(shape.shape, c, shape.name)
-                self._join(join, blend, k, shape.lipschitz * c.stretch)
             case Named():
-                self._emit(shape.shape, replace(c, name=shape.name, before=c.matrix, matrix=np.eye(4)), join, blend, k)
+                number = c.order.get(shape.name, 0)
+                c = replace(c, order={**c.order, shape.name: number + 1})
+                if _is_leaf(shape.shape):
+                    inside = replace(c, name=shape.name, number=number, before=c.matrix, matrix=np.eye(4))
+                    self._emit(shape.shape, inside, join, blend, k)
+                else:
+                    self._scope(shape.shape, c, shape.name, number)
+                    self._join(join, blend, k, shape.lipschitz * c.stretch)
             case Transformed():
                 inside = replace(c, matrix=c.matrix @ shape.placement, factor=c.factor * shape.factor)
                 self._emit(shape.shape, inside, join, blend, k)
@@ -311,11 +345,33 @@ class _Compiler:
             case Modifier():
                 self._modifier(shape, c)
                 self._join(join, blend, k, shape.lipschitz * c.stretch)
-            case _ if hasattr(shape, "copies"):
-                self._emit(Combination(tuple(shape.copies())), c, join, blend, k)
-            case _:
-                self._forever(shape, c)
+            case Repetition() if not shape.opaque:
+                self._combination(Combination(shape.copies()), c, join, blend, k, copies=True)
+            case Repetition():  # the values of the copies jump, only that of all together does not
+                self._scope(Combination(shape.copies()), c, opaque=True, copies=True)
                 self._join(join, blend, k, shape.lipschitz * c.stretch)
+            case _:
+                raise ParameterError(f"shape: a {type(shape).__name__} has no program")
+
+    def _names_in(self, shape: Shape) -> Counter[str]:
+        """How many parts of each name are in it."""
+        if id(shape) not in self._named_in:
+            found: Counter[str] = Counter([shape.name] if isinstance(shape, Named) else [])
+            for child in shape.children:
+                found += self._names_in(child)
+            self._named_in[id(shape)] = found
+        return self._named_in[id(shape)]
+
+    def _each(self, shapes: Sequence[Shape], c: _Context, copies: bool) -> list[tuple[Shape, _Context]]:
+        """Children with their contexts: what is named in them is numbered in order; in copies alike."""
+        order = dict(c.order)
+        made = []
+        for shape in shapes:
+            names = self._names_in(shape)
+            made.append((shape, replace(c, order=dict(order)) if names else c))
+            for name, count in names.items() if not copies else ():
+                order[name] = order.get(name, 0) + count
+        return made
 
     def _put(self, *rows: Sequence[float]) -> int:
         at = len(self._rows)
@@ -360,8 +416,9 @@ class _Compiler:
             self._put(*np.linalg.inv(placement)[:3])
         if c.name:
             assert c.before is not None
-            part = Part(slot, len(self._words), -1, True, c.before, c.matrix, c.factor, shape)
+            part = Part(c.number, slot, len(self._words), len(self._leaves), c.before, c.matrix, c.factor)
             self._names.setdefault(c.name, []).append(part)
+        self._leaves.append(Leaf(slot, shape, placement, c.margin))
         self._word(LEAF, self._kinds.of(shape), join, blend, flags, slot)
         if join == PUSH:
             self._pushed()
@@ -379,72 +436,83 @@ class _Compiler:
             self._payloads[id(samples)] = self._put(*padded.reshape(-1, 4)), samples
         return self._payloads[id(samples)][0]
 
-    def _combination(self, shape: Combination, c: _Context, join: int, blend: int, k: float) -> None:
-        children, inner = list(shape.shapes), _JOINS[shape.operation]
-        if len(children) == 1:
-            self._emit(children[0], c, join, blend, k)
-            return
-        if shape.smooth == 0:
-            if join == inner != SUBTRACT and blend == HARD:
-                for child in children:  # a union in a union
-                    self._emit(child, c, join, HARD, 0.0)
-                return
-            if shape.operation != "subtraction":
-                children.sort(key=lambda child: not _is_deep(child))  # what needs a stack comes first
-            if shape.operation != "union":
-                c = replace(c, margin=-1.0)
-            for i, child in enumerate(children):
-                cuts = shape.operation == "subtraction" and i > 0
-                self._emit(child, _cutting(c, cuts), inner if i else PUSH, HARD, 0.0)
-        else:
-            width, kind = shape.smooth * c.factor, _BLENDS[shape.blend]
-            if shape.operation != "union" or kind == ROOT:
-                c = replace(c, margin=-1.0)
-            if shape.operation == "subtraction":
-                self._emit(children[0], c, PUSH, HARD, 0.0)
-                rest = children[1:]
-                if len(rest) == 1:
-                    self._emit(rest[0], _cutting(c, True), SUBTRACT, kind, width)
-                else:
-                    self._pairs(rest, _cutting(c, True), UNION, kind, width, PUSH, HARD, 0.0)
-                    self._join(SUBTRACT, kind, width, shape.lipschitz * c.stretch)
-            else:
-                self._pairs(children, c, inner, kind, width, PUSH, HARD, 0.0)
-        self._join(join, blend, k, shape.lipschitz * c.stretch)
-
-    def _pairs(
-        self, shapes: list[Shape], c: _Context, inner: int, kind: int, width: float, join: int, blend: int, k: float
+    def _combination(
+        self, shape: Combination, c: _Context, join: int, blend: int, k: float, *, copies: bool = False
     ) -> None:
-        """Smooth joins of neighbours by pairs, as :meth:`Combination.distance` takes them."""
-        if len(shapes) == 1:
-            self._emit(shapes[0], c, join, blend, k)
+        inner = _JOINS[shape.operation]
+        smooth = shape.smooth > 0
+        if len(shape.shapes) > 1 and (shape.operation != "union" or (smooth and shape.blend == "root")):
+            c = replace(c, margin=-1.0)
+        children = self._each(shape.shapes, c, copies)
+        if len(children) == 1:
+            self._emit(*children[0], join, blend, k)
             return
-        if c.margin >= 0:
-            c = replace(c, margin=c.margin + width * (25.0 if kind == EXPONENTIAL else 1.0))
-        # Pairing from the left gives a first half of a power of two.
-        half = 1 << (len(shapes) - 1).bit_length() - 1
-        self._pairs(shapes[:half], c, inner, kind, width, PUSH, HARD, 0.0)
-        if len(shapes) - half == 1:
-            self._emit(shapes[half], c, inner, kind, width)
+        width, kind = shape.smooth * c.factor, _BLENDS[shape.blend] if smooth else HARD
+        lipschitz = shape.lipschitz * c.stretch
+        if shape.operation == "subtraction":
+            self._emit(*children[0], PUSH, HARD, 0.0)
+            rest = [(child, replace(inside, cuts=True, material=None)) for child, inside in children[1:]]
+            if not smooth or len(rest) == 1:
+                for child, inside in rest:
+                    self._emit(child, inside, SUBTRACT, kind, width)
+            else:
+                self._pairs(rest, UNION, kind, width)
+                self._join(SUBTRACT, kind, width, lipschitz)
+        elif smooth:
+            self._pairs(children, inner, kind, width)
         else:
-            self._pairs(shapes[half:], c, inner, kind, width, PUSH, HARD, 0.0)
-            self._join(inner, kind, width, max(shape.lipschitz for shape in shapes) * c.stretch)
-        self._join(join, blend, k, max(shape.lipschitz for shape in shapes) * c.stretch)
+            if join == inner and blend == HARD:  # a union in a union
+                for child, inside in children:
+                    self._emit(child, inside, join, HARD, 0.0)
+                return
+            children.sort(key=lambda child: not _is_deep(child[0]))  # what needs a stack comes first
+            for i, (child, inside) in enumerate(children):
+                self._emit(child, inside, inner if i else PUSH, HARD, 0.0)
+        self._join(join, blend, k, lipschitz)
 
-    def _scope(self, shape: Shape, c: _Context, name: str = "") -> None:
-        """A shape inside its pending transform as instructions of their own; a named one always has them."""
+    def _pairs(self, children: list[tuple[Shape, _Context]], inner: int, kind: int, width: float) -> None:
+        """Smooth joins of neighbours by pairs, as :meth:`Combination.distance` takes them."""
+        if len(children) == 1:
+            self._emit(*children[0], PUSH, HARD, 0.0)
+            return
+        if children[0][1].margin >= 0:
+            more = width * (25.0 if kind == EXPONENTIAL else 1.0)
+            children = [(child, replace(c, margin=c.margin + more)) for child, c in children]
+        # Pairing from the left gives a first half of a power of two.
+        half = 1 << (len(children) - 1).bit_length() - 1
+        self._pairs(children[:half], inner, kind, width)
+        if len(children) - half == 1:
+            self._emit(*children[half], inner, kind, width)
+        else:
+            self._pairs(children[half:], inner, kind, width)
+            self._join(inner, kind, width, max(child.lipschitz * c.stretch for child, c in children))
+
+    def _scope(
+        self, shape: Shape, c: _Context, name: str = "", number: int = 0, *, opaque: bool = False, copies: bool = False
+    ) -> None:
+        """A shape inside its pending transform as instructions of their own; a named one always has them.
+
+        Args:
+            opaque: nothing inside is pruned.
+            copies: the shape's children are copies of one.
+        """
+        flags = PLACED | (OPAQUE if opaque else 0)
         factor = c.factor
         slot = self._put(*np.linalg.inv(c.matrix)[:3], (factor, shape.lipschitz * c.stretch, 0, 0))
         entry = len(self._words)
-        self._word(ENTER, AFFINE, flags=PLACED, slot=slot)
+        self._word(ENTER, AFFINE, flags=flags, slot=slot)
         self._entered()
         inside = replace(c, matrix=np.eye(4), factor=1.0, stretch=c.stretch / factor, name="", before=None, margin=-1.0)
-        self._emit(shape, inside, PUSH, HARD, 0.0)
+        if copies:
+            assert isinstance(shape, Combination)
+            self._combination(shape, inside, PUSH, HARD, 0.0, copies=True)
+        else:
+            self._emit(shape, inside, PUSH, HARD, 0.0)
         self._places -= 1
         if name:
-            part = Part(slot, entry, len(self._words), False, c.matrix, np.eye(4), factor, shape)
+            part = Part(number, slot, entry, -1, c.matrix, np.eye(4), factor)
             self._names.setdefault(name, []).append(part)
-        self._word(LEAVE, AFFINE, flags=PLACED, slot=slot)
+        self._word(LEAVE, AFFINE, flags=flags, slot=slot)
 
     def _entered(self) -> None:
         self._places += 1
@@ -470,13 +538,6 @@ class _Compiler:
             self._places -= 1
         if shape.warps or shape.adjusts:
             self._word(LEAVE, code, flags=PLACED if shape.warps else 0, slot=slot)
-
-    def _forever(self, shape: Shape, c: _Context) -> None:
-        raise ParameterError(f"shape: a {type(shape).__name__} has no program")
-
-
-def _cutting(c: _Context, cuts: bool) -> _Context:
-    return replace(c, cuts=True, material=None) if cuts else c
 
 
 def _is_leaf(shape: Shape) -> bool:

@@ -34,8 +34,13 @@ UNCAPPED = 1e30
 
 
 class Repetition(Shape):
-    """One child many times: the union of :meth:`copies`."""
+    """One child many times: the union of :meth:`copies`.
 
+    Attributes:
+        opaque: whether the bound holds only for all copies together, so that none may be left out alone.
+    """
+
+    opaque: ClassVar[bool] = False
     shape: Shape
 
     def copies(self) -> tuple[Shape, ...]:
@@ -159,6 +164,7 @@ class RepeatedForever(Repetition):
     """Copies without end along some axes; see the module. A copy may reach into its neighbours' cells, but not
     through them."""
 
+    opaque: ClassVar[bool] = True
     shape: Shape
     spacing: Vec3 = param((1.0, 1.0, 1.0), 0, None, "between copies; 0: none on this axis", unit="m")
 

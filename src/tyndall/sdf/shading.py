@@ -262,6 +262,11 @@ class ShadedMaterial(Material):
         return found
 
 
+def shines(material: Material) -> bool:
+    """Whether a surface of it emits light."""
+    return any(material.emissive) or not getattr(material, "lit", True)
+
+
 class Shadings:
     """The shaders of some materials, numbered as they come, with their numbers in one array.
 
@@ -345,4 +350,4 @@ def described(material: ShadedMaterial) -> Mapping[str, tuple[float, ...]]:
     return dict(zip((p.name for p in material.shader.properties), material.grouped, strict=True))
 
 
-__all__ = ["EXAMPLE", "FragmentShader", "Property", "ShadedMaterial", "Shadings", "described", "validate"]
+__all__ = ["EXAMPLE", "FragmentShader", "Property", "ShadedMaterial", "Shadings", "described", "shines", "validate"]

@@ -6,11 +6,17 @@ import numpy as np
 import props
 import pytest
 
+from tyndall.frame import Renderer
 from tyndall.gpu.device import Gpu
 from tyndall.gpu.params import ParameterError
-from tyndall.scene.model import Material
+from tyndall.scene.model import Implicit, Mat4, Material, Scene
+from tyndall.sdf import sphere
 from tyndall.sdf.sandbox import SnippetError
 from tyndall.sdf.shading import FragmentShader, Property, Shadings, described, validate
+from tyndall.techniques.antialiasing import NoAntialiasing
+from tyndall.techniques.volumetric import Off
+
+RED = Material("red", (1, 0, 0, 1))
 
 # Algorithms 16 and 17 of the document, in WGSL.
 BLEND = FragmentShader(
@@ -32,6 +38,11 @@ TELL = FragmentShader(
     }""",
     (Property("which", "int", 0, 9),),
 )
+
+
+def at(x: float) -> Mat4:
+    """Two metres before the camera."""
+    return ((1, 0, 0, x), (0, 1, 0, 0), (0, 0, 1, -2), (0, 0, 0, 1))
 
 
 @pytest.mark.parametrize(
@@ -149,3 +160,36 @@ def test_on_the_device(gpu: Gpu) -> None:
 def test_without_shaders_there_is_still_a_function() -> None:
     assert "implicit_shade" in Shadings().wesl()
     assert Shadings().numbers.shape == (1,)
+
+
+def test_in_a_picture(gpu: Gpu) -> None:
+    """Lit, the colour is the albedo; else it is emitted, from the place, normal and ray of each pixel."""
+    told = FragmentShader(
+        "Told",
+        """fn shade(p: FragmentProperties) -> vec3f {
+            if which == 0 { return p.world_normal * 0.5 + 0.5; }
+            return vec3f(p.ray_distance, dot(p.object_position, p.object_position), -p.ray_direction.z);
+        }""",
+        (Property("which", "int"),),
+    )
+    spheres = [
+        Implicit(sphere(0.4).material(BLEND.material(**PURPLE)), at(-0.6)),
+        Implicit(sphere(0.4) | sphere(0.1).material(RED).at(9), at(0.6), told.material(which=0, lit=False)),
+        Implicit(sphere(0.2), at(0.0), told.material(which=1, lit=False)),
+    ]
+    scene = Scene(camera=props.AHEAD, implicits=tuple(spheres))
+    with Renderer(scene, (48, 36), gpu=gpu, volumetric=Off(), antialiasing=NoAntialiasing()) as renderer:
+        renderer.draw()
+        images = {name: gpu.read_texture(renderer._images[name]) for name in ("albedo_metallic", "emissive")}
+        normals = renderer.surface("normals")
+    t = 0.61803398874
+    purple = (1 - t) * np.array(PURPLE["_Color1"]) + t * np.array(PURPLE["_Color2"])
+    np.testing.assert_allclose((images["albedo_metallic"][18, 13, :3] / 255) ** 2, purple, atol=0.01)
+    assert not images["emissive"][18, 13, :3].any()
+    seen = np.linalg.norm(normals, axis=2) > 0.5
+    seen[:, :30] = False
+    assert seen.sum() > 20
+    np.testing.assert_allclose(images["emissive"][seen][:, :3], normals[seen] * 0.5 + 0.5, atol=0.005)
+    assert not images["albedo_metallic"][seen][:, :3].any()
+    distance, square, ahead = images["emissive"][18, 24, :3].astype(float)
+    np.testing.assert_allclose([distance, square, ahead], [1.8, 0.04, 1.0], atol=0.01)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from tyndall.gpu.params import ParameterError, fields_of, nearest, replace
-from tyndall.techniques import antialiasing, occlusion, shadow, tonemap, volumetric
+from tyndall.techniques import antialiasing, occlusion, reflection, shadow, tonemap, volume, volumetric
 from tyndall.techniques.contract import Technique
 
 
@@ -73,6 +73,8 @@ FAMILIES: dict[str, Family] = {
         _family("shadow", shadow, "shadow_map"),
         _family("volumetric", volumetric, "froxel"),
         _family("occlusion", occlusion, "none"),
+        _family("reflection", reflection, "field_reflections"),
+        _family("volume", volume, "uniform_march"),
         _family("antialiasing", antialiasing, "taa"),
         _family("tonemap", tonemap, "aces"),
     )

@@ -13,7 +13,7 @@ from types import UnionType
 from typing import Any, Literal, Union, get_args, get_origin
 
 from tyndall.gpu.params import Field
-from tyndall.sdf import modifiers, solids
+from tyndall.sdf import grid, modifiers, profiles, repetition, solids
 from tyndall.sdf.shape import Combination, Modifier, Named, Operation, Painted, Primitive, Shape, Transformed
 from tyndall.sdf.snippets import Snippet
 
@@ -26,7 +26,7 @@ OPERATIONS: dict[str, Operation] = {
     "SmoothSubtraction": "subtraction",
 }
 GROUP = "Operations/Group"
-_DECLARED = (modifiers, solids)  # where nodes are declared, and loaded with this module
+_DECLARED = (grid, modifiers, profiles, repetition, solids)  # where nodes are declared, and loaded with this module
 _SPECIAL = (Combination, Transformed, Painted, Named, Snippet)
 
 
@@ -79,8 +79,8 @@ def type_names() -> dict[type[Shape], str]:
 
 
 def is_data(f: Field) -> bool:
-    """Whether a declared parameter is floating-point numbers, which S5 gives as ``data``."""
-    return f.type is float or (get_origin(f.type) is tuple and set(get_args(f.type)) == {float})
+    """Whether a declared parameter of a primitive is numbers, which S5 gives as ``data``."""
+    return f.type in (float, int) or (get_origin(f.type) is tuple and set(get_args(f.type)) <= {float, int})
 
 
 def width(f: Field) -> int:

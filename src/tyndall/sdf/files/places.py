@@ -8,7 +8,6 @@ from typing import Any
 
 _TOKEN = re.compile(r'\s*(?:(?P<string>"(?:[^"\\]|\\.)*")|(?P<sign>[{}\[\],:])|(?P<other>[^\s{}\[\],:"]+))', re.DOTALL)
 Path = tuple[str | int, ...]
-DEEPEST = 2000  # brackets
 
 
 class _RefusedError(ValueError):

@@ -681,7 +681,7 @@ class _File:
                 self.stop(spot, f"{len(items)} numbers; {f.name} needs {at}")
                 break
             if None not in own:
-                values[f.name] = self._declared(f"{where}.{f.name}", f, own[0] if f.type is float else own)
+                values[f.name] = self._declared(f"{where}.{f.name}", f, own[0] if f.type in (float, int) else own)
         return values
 
     def _snippet(self, where: str, custom: SnippetKind, data: dict[str, Any]) -> Shape | None:

@@ -4,6 +4,7 @@ from tyndall.techniques.contract import Technique
 from tyndall.techniques.shadow.blurred import Blurred
 from tyndall.techniques.shadow.esm import Esm
 from tyndall.techniques.shadow.evsm import Evsm
+from tyndall.techniques.shadow.field import FieldShadows
 from tyndall.techniques.shadow.pcf import Pcf
 from tyndall.techniques.shadow.pcss import Pcss
 from tyndall.techniques.shadow.penumbra_wedge import PenumbraWedge
@@ -27,4 +28,5 @@ MEMBERS: tuple[type[Technique], ...] = (
     Planar,
     Projective,
     RayTraced,
+    FieldShadows,
 )
