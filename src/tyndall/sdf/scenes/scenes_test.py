@@ -14,6 +14,7 @@ from tyndall.scene.model import Implicit, Scene, transforms
 from tyndall.sdf.program import Kinds, compile_shape
 from tyndall.sdf.scenes import NODES, jumper, portrait, snail, swarm, temple
 from tyndall.sdf.scenes.parts import curve, limb, nearer, paint
+from tyndall.sdf.scenes.portrait import laid
 from tyndall.sdf.scenes.swarm import WAVE, morton
 from tyndall.sdf.shape import Floats, Shape
 from tyndall.sdf.solids import sphere
@@ -224,3 +225,10 @@ def test_what_is_nearer_is_seen_in_the_same_direction() -> None:
 def test_paint_is_linear() -> None:
     assert np.allclose(paint("#ff8000").base_color, (1, 0.21586, 0, 1), atol=1e-4)
     assert paint("#ffffff", glow=2.0).emissive == (2.0, 2.0, 2.0)
+
+
+def test_what_is_laid_onto_a_shape_is_on_its_surface() -> None:
+    ball = sphere(1.0)
+    places = laid(ball, [(0.0, 0.0), (0.3, -0.4)])
+    assert np.allclose(places[:, 2], np.sqrt(1 - (places[:, :2] ** 2).sum(axis=1)), atol=1e-6)
+    assert np.allclose(ball(laid(ball, [(0.0, 0.0)], 0.1)), 0.1, atol=1e-6)
