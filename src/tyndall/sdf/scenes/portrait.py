@@ -74,7 +74,7 @@ def _skull() -> Shape:
 
 
 def laid(shape: Shape, points: Sequence[tuple[float, float]], lift: float = 0.0) -> Floats:
-    """(N, 3) places in front of a shape at x and y, found along −Z by its own distances, and moved by a lift along Z."""
+    """(N, 3) places where a shape is met along −Z at x and y, by its own distances; a lift moves them along Z."""
     places = np.array([(x, y, 2.0) for x, y in points])
     for _ in range(48):
         places[:, 2] -= shape(places)
@@ -341,9 +341,9 @@ def _scarf() -> Shape:
 
 
 def _backdrop() -> Shape:
-    disc = cylinder(3.1, 0.12).at(-0.5, 0.1, -6.9).material(DISC)
-    wall = box((26, 16, 0.3)).at(0, 0, -7.2).material(WALL)
-    ring = torus(3.45, 0.04).at(-0.5, 0.1, -7.0).material(GOLD)
+    disc = cylinder(3.45, 0.12).at(-0.55, 0.1, -8.7).material(DISC)
+    wall = box((30, 18, 0.3)).at(0, 0, -9.0).material(WALL)
+    ring = torus(3.85, 0.045).at(-0.55, 0.1, -8.8).material(GOLD)
     return union(disc, wall, ring)
 
 
