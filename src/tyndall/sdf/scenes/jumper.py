@@ -155,7 +155,7 @@ def creature() -> Shape:
     """The jumper at rest in the air: parts ``body``, ``left ear``, ``right ear``, ``left foot``, ``right foot``."""
     ears = [_ear(1 if at[0] > 0 else -1).at(*at).named(name) for name, at in EARS.items()]
     feet = [_foot(1 if at[0] > 0 else -1).at(*at).named(name) for name, at in FEET.items()]
-    return union(_trunk().named("body"), *ears, *feet, smooth=0.0)
+    return union(_trunk().named("body"), *ears, *feet)
 
 
 def _hop(time: float) -> tuple[Floats, dict[str, ArrayLike]]:
