@@ -31,7 +31,7 @@ from tyndall.scene.model import (
     Texture,
     Volume,
 )
-from tyndall.sdf import box, sphere, union
+from tyndall.sdf import sphere, union
 from tyndall.sdf.field import Field
 from tyndall.sdf.snippets import Snippet, SnippetSource, evaluate
 from tyndall.techniques import FAMILIES

@@ -50,9 +50,8 @@ GLOW = tuple(
 )
 
 
-POSE = np.diag([1.0, 1.0, 1.0, 1.0])
+POSE = spin(12, 14, 10) @ np.diag([1.14, 1.14, 1.14, 1.0])
 POSE[:3, 3] = SHELL
-POSE = POSE @ spin(12, 14, 10) @ np.diag([1.14, 1.14, 1.14, 1.0])
 
 
 def whorl(turn: ArrayLike) -> tuple[Floats, Floats, Floats]:
