@@ -13,6 +13,7 @@ import tyndall.sdf
 from tyndall.frame import Renderer
 from tyndall.gpu.device import Gpu, GpuError
 from tyndall.gpu.params import fields_of
+from tyndall.lab import field_check
 from tyndall.lab.baseline import Baseline
 from tyndall.lab.busy import Busy
 from tyndall.lab.truth import TruthSettings, trace
@@ -28,8 +29,10 @@ from tyndall.scene.model import (
     Scene,
     SpotLight,
     Texture,
+    Volume,
 )
 from tyndall.sdf import box, sphere, union
+from tyndall.sdf.field import Field
 from tyndall.sdf.snippets import Snippet, SnippetSource, evaluate
 from tyndall.techniques import FAMILIES
 from tyndall.techniques.contract import Unsupported
@@ -102,11 +105,21 @@ def test_every_entry_point_compiles_and_is_used(gpu: Gpu, monkeypatch: pytest.Mo
         renderer.draw()
     shape = union(*[solid(size) for size in (0.3, 0.4, 0.5) for solid in (sphere, box)], smooth=0.1)
     surfaces = [Implicit(shape, _mirror, Material(emissive=(1, 1, 1)))]
-    fields = Scene(SHAPES[:1], LIGHTS[:1], props.AHEAD, implicits=surfaces)
+    fields = Scene(
+        SHAPES[:1], LIGHTS[:1], props.AHEAD, implicits=surfaces, volumes=[Volume(sphere(), Medium(0.1, 0.1))]
+    )
     with Renderer(fields, (8, 6), gpu=gpu, shadow=ShadowMap(size=64)) as renderer:
         for name in ("shadow_map", "planar", "projective"):
             renderer.use("shadow", FAMILIES["shadow"].make(name, changes={"map_size": 64} if name[0] == "p" else None))
             renderer.draw()
+        for family, name in (("shadow", "field"), ("occlusion", "field_ao"), ("reflection", "field_reflections")):
+            renderer.use(family, FAMILIES[family].make(name))
+            renderer.draw()
+    with monkeypatch.context() as patch, Field(gpu, surfaces) as field:
+        field_check.values(gpu, field, 0, [[0, 0, 0]])
+        patch.setattr("tyndall.sdf.field._LONG", 5)
+        with Field(gpu, surfaces) as long:
+            long.update()
     for depth in (2, 3):
         trace(scene, (8, 6), TruthSettings(target=1, depth=depth), gpu=gpu, cache=False)
     with World(gpu, scene, movable=True) as world:
@@ -150,6 +163,8 @@ def test_every_module_is_imported_or_has_an_entry_point(gpu: Gpu) -> None:
     overlaid |= set(IN_WORDS.values())
     # Functions of shapes, which a field's bindings import by name, are beside what they are described by.
     overlaid |= {f"package::sdf::{path.stem}" for path in Path(tyndall.sdf.__file__).parent.glob("*.py")}
+    # The text by which rays ask for implicit surfaces names one or the other.
+    overlaid |= {"package::tracing::fields", "package::tracing::no_fields"}
     for module in texts.keys() - roots - overlaid:
         users = [m for m, text in texts.items() if re.search(rf"import {module}\b", text)]
         assert users, f"{module} is imported nowhere"

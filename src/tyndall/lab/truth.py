@@ -214,7 +214,7 @@ def trace(
         try:
             with _Tracer(device, scene, size, settings) as tracer:
                 found = _converge(tracer, settings, before, progress)
-        except _CutOff:
+        except _CutOffError:
             with _Tracer(device, scene, size, settings, most_samples=1) as tracer:
                 found = _converge(tracer, settings, before, progress)
     finally:
@@ -388,7 +388,7 @@ def _pooled(a: Truth, b: Truth) -> Truth:
 # --- device -------------------------------------------------------------------------------------------------------
 
 
-class _CutOff(GpuError):
+class _CutOffError(GpuError):
     """The adapter ended an invocation's loops before they were done."""
 
     def __init__(self) -> None:
@@ -579,7 +579,7 @@ class _Tracer(Closing):
         sums = self._gpu.read_buffer(self._totals).view(np.float32).reshape(-1, 4).sum(axis=0, dtype=np.float64)
         light, air, square, air_square = (float(x) / (3 * self.size[0] * self.size[1]) for x in sums)
         if light < 0:
-            raise _CutOff
+            raise _CutOffError
         self._squares = 3 * (square + air_square)  # of an ordinary pixel, all channels
         scale = self._batches * (self._batches - 1)
         unit = self._unit
@@ -596,7 +596,7 @@ class _Tracer(Closing):
         depth = self._gpu.read_buffer(self._depths).view(np.float32)[: width * height].reshape(height, width)
         surfaces, air = moments[..., 0, :], moments[..., 1, :]
         if surfaces.min() < 0:
-            raise _CutOff
+            raise _CutOffError
         scale = 1 / (self._batches * (self._batches - 1))
         errors = [np.sqrt(np.maximum(moments[..., i, :], 0) * scale) for i in (2, 3)]
         with np.errstate(over="ignore"):  # who asked for it is told

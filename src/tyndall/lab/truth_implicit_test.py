@@ -13,7 +13,16 @@ from tyndall.lab import truth as module
 from tyndall.lab.meshed import meshed
 from tyndall.lab.truth import Truth, TruthSettings, trace, unit_of
 from tyndall.lab.ztest import z_test
-from tyndall.scene.model import Camera, DirectionalLight, HenyeyGreenstein, Implicit, Material, Medium, PointLight, Scene
+from tyndall.scene.model import (
+    Camera,
+    DirectionalLight,
+    HenyeyGreenstein,
+    Implicit,
+    Material,
+    Medium,
+    PointLight,
+    Scene,
+)
 from tyndall.sdf import box, sphere, union
 
 ROUGH = Material("rough", base_color=(0.8, 0.7, 0.6, 1), roughness=0.9)
@@ -128,9 +137,7 @@ def test_its_own_light_is_in_the_unit(gpu: Gpu) -> None:
 def test_the_cache_knows_the_code_of_implicit_surfaces(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
     listed: list[Path] = []
     monkeypatch.setattr(module, "version_of", lambda sources: listed.extend(sources) or "version")
-    one, two = (
-        module._entry(Scene(implicits=[Implicit(sphere(r))]), (4, 3), ONCE, gpu) for r in (1.0, 1.0000001)
-    )
+    one, two = (module._entry(Scene(implicits=[Implicit(sphere(r))]), (4, 3), ONCE, gpu) for r in (1.0, 1.0000001))
     assert one != two
     names = {f"{path.parent.name}/{path.name}" for path in listed}
     assert {"sdf/march.wesl", "sdf/interpreter.wesl", "sdf/program.py", "sdf/field.py", "tracing/fields.wesl"} <= names

@@ -298,7 +298,7 @@ class _Reader:
             "normal_texture": row.get("normalTexture"),
             "emissive_texture": row.get("emissiveTexture"),
         }
-        maps: dict[str, Texture | None] = {}
+        maps: dict[str, Any] = {}
         uv_set: int | None = None
         for name, info in infos.items():
             if info is None:
