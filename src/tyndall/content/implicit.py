@@ -125,8 +125,8 @@ class Fields:
         features = {"alone": alone, "tiled": self._starts is not None}
         if self._starts is not None:
             bound["field_starts"] = self._starts.read_write()
-            tiles = (-(-side // _TILE) for side in self._size)
-            gpu.compute("gbuffer.field_tiles", MODULE, "tiles").bind(bound).dispatch(*tiles, len(self._placed))
+            across, down = (-(-side // _TILE) for side in self._size)
+            gpu.compute("gbuffer.field_tiles", MODULE, "tiles").bind(bound).dispatch(across, down, len(self._placed))
             bound["field_starts"] = self._starts.read()
         gpu.compute("gbuffer.field_march", MODULE, "march").bind(
             bound, field_depth_out=images["depth"].write(), field_ids_out=images["ids"].write()

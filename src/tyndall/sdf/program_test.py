@@ -15,7 +15,6 @@ from tyndall.sdf.program import (
     HARD,
     INTERSECT,
     LEAF,
-    LEAVE,
     NEGATE,
     PLACED,
     POLYNOMIAL,
@@ -58,12 +57,17 @@ def run_stacks(program: Program) -> tuple[int, int]:
 
 
 def test_a_leaf_joins_what_is_before_it() -> None:
-    """So a long union needs no stack."""
-    program = compiled(union(*(sphere().at(float(i)) for i in range(100)), smooth=0.1))
+    """So a long union needs no stack; a smooth one, which joins by pairs, a shallow one."""
+    balls = [sphere().at(float(i)) for i in range(100)]
+    program = compiled(union(*balls))
     assert kinds_of(program) == [(LEAF, PUSH), *[(LEAF, UNION)] * 99]
-    assert program.values == 1
-    blends = program.words[1:, 0] >> 24 & 3
-    assert (blends == POLYNOMIAL).all()
+    assert (program.words[:, 0] >> 24 & 3 == HARD).all()
+    assert run_stacks(program)[0] == 1
+    program = compiled(union(*balls, smooth=0.1))
+    joins = program.words[[join != PUSH for _, join in kinds_of(program)], 0]
+    assert len(joins) == 99
+    assert (joins >> 24 & 3 == POLYNOMIAL).all()
+    assert run_stacks(program)[0] <= 7  # log₂ 100
 
 
 def test_each_operation_has_its_join() -> None:
@@ -126,7 +130,10 @@ def test_parts_are_numbered_and_copies_share_a_number() -> None:
     ball = sphere(0.1).named("ball")
     pair = (ball | ball.at(1)).repeat((3, 0, 0), (4, 1, 1))
     parts = compiled(pair).names["ball"]
-    assert [part.number for part in parts] == [0, 1] * 4
+    assert sorted(part.number for part in parts) == [0] * 4 + [1] * 4
+    for number in (0, 1):
+        copies = [(part.before @ part.after)[0, 3] for part in parts if part.number == number]
+        np.testing.assert_allclose(sorted(copies), number + np.array([-4.5, -1.5, 1.5, 4.5]))
     assert all(part.leaf >= 0 for part in parts)
     group = (sphere() - box()).named("group").at(1)
     (part,) = compiled(group | torus()).names["group"]
@@ -177,9 +184,9 @@ def test_kinds_are_numbered_as_they_come() -> None:
     assert [kinds.of(shape) for shape in (sphere(3), box(2), torus())] == [0, 1, 2]
 
 
-def test_refused() -> None:
+def test_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(ParameterError, match="Circle is flat; extrude or revolve it"):
         compiled(circle())
-    with pytest.raises(ParameterError):
-        compiled(sphere(0.1).repeat((1, 0, 0)).at(0.1).repeat((0, 5, 0)))
-    assert LEAVE == 3
+    monkeypatch.setattr("tyndall.sdf.program._MOST_NODES", 2)
+    with pytest.raises(ParameterError, match="3 nodes; 2 are the most"):
+        compiled(sphere() | box())
