@@ -300,7 +300,7 @@ class _Reader:
             "normal_texture": row.get("normalTexture"),
             "emissive_texture": row.get("emissiveTexture"),
         }
-        maps: dict[str, Texture | None] = {}
+        maps: dict[str, Any] = {}
         uv_set: int | None = None
         for name, info in infos.items():
             if info is None:
@@ -322,18 +322,16 @@ class _Reader:
         try:
             material = Material(
                 name=row.text("name"),
-                base_color=surface.numbers("baseColorFactor", (1.0, 1.0, 1.0, 1.0)),  # type: ignore[arg-type]
+                base_color=surface.numbers("baseColorFactor", (1.0, 1.0, 1.0, 1.0)),
                 metallic=surface.number("metallicFactor", 1.0),
                 roughness=surface.number("roughnessFactor", 1.0),
-                emissive=tuple(  # type: ignore[arg-type]
-                    strength * e for e in row.numbers("emissiveFactor", (0.0, 0.0, 0.0))
-                ),
+                emissive=tuple(strength * e for e in row.numbers("emissiveFactor", (0.0, 0.0, 0.0))),
                 alpha_mode="opaque" if mode == "OPAQUE" else "mask",
                 alpha_cutoff=row.number("alphaCutoff", 0.5),
                 double_sided=row.flag("doubleSided"),
                 transmission=row.object("extensions", "KHR_materials_transmission").number("transmissionFactor", 0.0),
                 ior=ior or 1.5,  # 0 asks for a mirror at every angle in older files
-                **maps,  # type: ignore[arg-type]
+                **maps,
             )
         except ParameterError as error:
             row.stop(str(error))
