@@ -41,6 +41,7 @@ from tyndall.scene.model import (
     transforms,
 )
 from tyndall.sdf.field import Field
+from tyndall.sdf.marching import Marching
 from tyndall.techniques import FAMILIES, Technique
 from tyndall.techniques.contract import View
 from tyndall.techniques.reflection.field_reflections import shows_surroundings
@@ -86,6 +87,7 @@ class Renderer(Closing):
         adapter: part of an adapter's name, for a device of its own.
         volumetric, shadow, occlusion, reflection, volume, antialiasing, tonemap: techniques, by name or as instances;
             by name they start from the scene's ``looks``.
+        marching: when rays through implicit surfaces end; as the scene's ``looks`` have it unless given.
         seed: of everything random.
 
     Raises:
@@ -109,6 +111,7 @@ class Renderer(Closing):
         volume: str | Technique | None = None,
         antialiasing: str | Technique | None = None,
         tonemap: str | Technique | None = None,
+        marching: Marching | None = None,
         seed: int = 0,
     ) -> None:
         if not all(isinstance(side, (int, np.integer)) for side in size):
@@ -118,6 +121,7 @@ class Renderer(Closing):
         if not 0 <= seed < 2**32:
             raise ParameterError(f"seed: {seed} is outside 0 … 4294967295")
         self.scene, self.size, self.seed = scene, size, seed
+        self._marching = marching
         chosen = {
             "volumetric": volumetric,
             "shadow": shadow,
@@ -162,7 +166,8 @@ class Renderer(Closing):
         self._meshes = Meshes(gpu, self.scene)
         self._content = [self._meshes]
         if self.scene.implicits:
-            self._fields = Fields(gpu, self.scene, size)
+            marching = self._marching or replace(Marching(), **self.scene.looks.get("marching", {}))
+            self._fields = Fields(gpu, self.scene, size, marching)
             self._content.append(self._fields)
         for volume in self.scene.volumes:
             self._volumes.append(self._fill(volume))
@@ -428,14 +433,16 @@ class Renderer(Closing):
         Raises:
             ParameterError: no such name, or what are no transforms.
         """
-        matrices = transforms(name, moves)
         objects = self._objects(name)
-        if len(matrices) < len(objects):
-            raise ParameterError(f"{name}: {len(matrices)} transforms for {len(objects)} objects")
-        for index, matrix in zip(objects, matrices, strict=False):
+        given = np.asarray(moves, np.float64)
+        if objects or given.shape[1:] != (3,):  # ways of parts are written as they are
+            given = transforms(name, moves)
+        if len(given) < len(objects):
+            raise ParameterError(f"{name}: {len(given)} transforms for {len(objects)} objects")
+        for index, matrix in zip(objects, given, strict=False):
             self.place(index, matrix @ np.asarray(self.scene.implicits[index].transform))
         if self._fields and name in self._fields.parts:
-            self._fields.field.move(name, matrices[len(objects) :])
+            self._fields.field.move(name, given[len(objects) :])
             self._moved = True
         elif not objects:
             self._unknown(name)

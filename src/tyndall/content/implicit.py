@@ -30,6 +30,7 @@ from tyndall.gpu.device import Gpu, Raster
 from tyndall.gpu.resources import Bound, Buffer, Resource, Texture
 from tyndall.scene.model import Implicit, Material, Scene
 from tyndall.sdf.field import Field
+from tyndall.sdf.marching import Marching
 from tyndall.sdf.shading import shines
 from tyndall.sdf.shape import Named, Painted, Shape
 
@@ -49,7 +50,7 @@ class Fields:
         parts: names of parts of the shapes.
     """
 
-    def __init__(self, gpu: Gpu, scene: Scene, size: tuple[int, int]) -> None:
+    def __init__(self, gpu: Gpu, scene: Scene, size: tuple[int, int], marching: Marching | None = None) -> None:
         self._gpu, self._size, self._lights = gpu, size, len(scene.lights)
         self._placed = [np.asarray(one.transform) for one in scene.implicits]
         self._moves = False
@@ -61,7 +62,7 @@ class Fields:
         self._shade: Texture | None = None
         self.emits = any(shines(material) for one in scene.implicits for material in materials_of(one))
         self.parts = {node.name for one in scene.implicits for node in nodes_of(one.shape) if isinstance(node, Named)}
-        self.field = Field(gpu, scene.implicits)
+        self.field = Field(gpu, scene.implicits, marching=marching)
         try:
             for name, format in (("depth", "r32float"), ("ids", "r32uint")):
                 self._images[name] = gpu.texture(f"field.{name}", size, format, owner=OWNER)

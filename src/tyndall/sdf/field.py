@@ -31,10 +31,11 @@ from tyndall.gpu.device import ComputePass, Gpu
 from tyndall.gpu.params import ParameterError, nearest
 from tyndall.gpu.resources import Buffer, Closing, ParamsBuffer, Resource
 from tyndall.scene.model import Implicit, Material
+from tyndall.sdf.hull import Hull
 from tyndall.sdf.marching import Marching
 from tyndall.sdf.program import TURNED, Kinds, Leaf, Part, Program, compile_shape
 from tyndall.sdf.shading import Shadings
-from tyndall.sdf.shape import Box, Floats
+from tyndall.sdf.shape import Box, Floats, Shape
 from tyndall.sdf.snippets import validate
 
 OWNER = "implicit"
@@ -70,7 +71,9 @@ class _Parts:
     before: Floats
     after: Floats
     factors: Floats
+    rest: Floats
     is_straight: bool
+    is_in_order: bool
 
     @classmethod
     def of(cls, name: str, parts: Sequence[Part]) -> _Parts:
@@ -90,7 +93,9 @@ class _Parts:
             before,
             after,
             np.array([p.factor for p in parts]),
-            bool((linear == np.eye(3)).all()),
+            before[:, :3, 3] + after[:, :3, 3],
+            bool((linear == np.eye(3)).all()) and all(p.leaf >= 0 for p in parts),
+            bool((numbers == np.arange(len(parts))).all()),
         )
 
 
@@ -129,15 +134,27 @@ class _Object:
     dirty: bool = True
     moves: dict[str, Floats] = dataclasses.field(default_factory=dict)
     parts: dict[str, _Parts] = dataclasses.field(default_factory=dict)
+    turned: set[str] = dataclasses.field(default_factory=set)  # names of parts that are
+    moved: bool = False  # since the box was fitted
+    hull: Hull | None = None
+    has_hull: bool = False  # was looked for
+    jobs: list[Any] | None = None
     halves: Floats | None = None  # of the leaves' boxes in their own spaces, and their middles
     middles: Floats = dataclasses.field(default_factory=lambda: np.zeros((0, 3)))
 
     def __post_init__(self) -> None:
         self.placements = np.array([leaf.placement for leaf in self.program.leaves])
+        self.is_straight = bool((self.placements[:, :3, :3] == np.eye(3)).all())
 
     def leaves(self) -> list[tuple[Leaf, float]]:
         """The leaves, each with what its values are multiplied by."""
         return [(leaf, float(self.program.slots[leaf.slot, 3])) for leaf in self.program.leaves]
+
+    @property
+    def shape(self) -> Shape:
+        shape: Any = self.implicit.shape
+        made: Shape = shape
+        return made
 
     @property
     def cells(self) -> int:
@@ -312,6 +329,7 @@ class Field(Closing):
     def _describe(self, index: int) -> None:
         """Write an object's row."""
         made, row = self._objects[index], self._rows[index]
+        made.jobs = None
         program = made.program
         placement = np.asarray(made.implicit.transform, np.float64)
         row["to_local"] = np.linalg.inv(placement)[:3]
@@ -379,54 +397,69 @@ class Field(Closing):
         return found
 
     def _move(self, made: _Object, parts: _Parts, given: Floats) -> None:
-        moves = given[parts.numbers]
-        slots = made.first_slot + 1 + parts.slots
-        leaves = parts.leaves >= 0
-        if moves.ndim == 2 and parts.is_straight and leaves.all():
-            places = parts.before[:, :3, 3] + moves + parts.after[:, :3, 3]
+        moves = given if parts.is_in_order else given[parts.numbers]
+        slots = parts.slots + (made.first_slot + 1)
+        entries = made.first_word + parts.entries
+        if moves.ndim == 2 and parts.is_straight:
+            places = parts.rest + moves
             self._slots[slots, :3] = places
-            turned = np.zeros(len(slots), bool)
             made.placements[parts.leaves, :3, 3] = places
-            made.placements[parts.leaves, :3, :3] = np.eye(3)
+            if parts.name in made.turned:
+                made.placements[parts.leaves, :3, :3] = np.eye(3)
+                made.turned.discard(parts.name)
+                self._flag(entries, np.zeros(len(entries), bool))
         else:
-            if moves.ndim == 2:
-                ways, moves = moves, np.tile(np.eye(4), (len(moves), 1, 1))
-                moves[:, :3, 3] = ways
-            placed = parts.before @ moves @ parts.after
-            stretch = _least_stretches(moves[:, :3, :3])
-            if (stretch < 1e-9).any():
-                raise ParameterError("matrices: a transform that has no inverse")
-            rows = np.linalg.inv(placed)[:, :3].astype(np.float32)
-            factors = parts.factors * stretch
-            turned = (np.abs(placed[:, :3, :3] - np.eye(3)) > 1e-12).any(axis=(1, 2))
-            own = slots[leaves]
-            self._slots[own, :3] = placed[leaves, :3, 3]
-            self._slots[own, 3] = factors[leaves]
-            for row in range(3):
-                self._slots[own + 4 + row] = rows[leaves, row]
-                self._slots[slots[~leaves] + row] = rows[~leaves, row]
-            self._slots[slots[~leaves] + 3, 0] = factors[~leaves]
-            made.placements[parts.leaves[leaves]] = placed[leaves]
-        entries = made.first_word + parts.entries[leaves]
-        flags = np.where(turned[leaves], self._words[entries, 0] | TURNED, self._words[entries, 0] & ~np.uint32(TURNED))
-        if (flags != self._words[entries, 0]).any():
-            self._words[entries, 0] = flags
-            low, high = int(entries.min()), int(entries.max()) + 1
-            self._write(self._list_buffer, self._words[low:high], 8 * low)
+            self._turn(made, parts, _matrices(moves), slots, entries)
         low, high = int(slots.min()), int(slots.max()) + _LEAF_SLOTS
         self._write(self._slot_buffer, self._slots[low:high], 16 * low)
         made.moves[parts.name] = given
-        self._fit(made)
-        made.dirty = True
+        made.dirty = made.moved = True
+
+    def _turn(
+        self, made: _Object, parts: _Parts, moves: Floats, slots: NDArray[np.intp], entries: NDArray[np.intp]
+    ) -> None:
+        """Write the transforms of parts that are turned, or not leaves."""
+        placed = parts.before @ moves @ parts.after
+        stretch = _least_stretches(moves[:, :3, :3])
+        if (stretch < 1e-9).any():
+            raise ParameterError(f"{parts.name}: a transform that has no inverse")
+        rows = np.linalg.inv(placed)[:, :3].astype(np.float32)
+        factors = parts.factors * stretch
+        leaves = parts.leaves >= 0
+        own, scopes = slots[leaves], slots[~leaves]
+        self._slots[own, :3] = placed[leaves, :3, 3]
+        self._slots[own, 3] = factors[leaves]
+        for row in range(3):
+            self._slots[own + 4 + row] = rows[leaves, row]
+            self._slots[scopes + row] = rows[~leaves, row]
+        self._slots[scopes + 3, 0] = factors[~leaves]
+        made.placements[parts.leaves[leaves]] = placed[leaves]
+        turned = (np.abs(placed[leaves, :3, :3] - np.eye(3)) > 1e-12).any(axis=(1, 2))
+        if turned.any() or parts.name in made.turned:
+            made.turned.add(parts.name)
+            self._flag(entries[leaves], turned)
+
+    def _flag(self, entries: NDArray[np.intp], turned: NDArray[np.bool_]) -> None:
+        """Say of leaves whether their places are turned, or only moved."""
+        words = self._words[entries, 0]
+        flagged = np.where(turned, words | TURNED, words & ~np.uint32(TURNED))
+        if (flagged != words).any():
+            self._words[entries, 0] = flagged
+            low, high = int(entries.min()), int(entries.max()) + 1
+            self._write(self._list_buffer, self._words[low:high], 8 * low)
 
     def _fit(self, made: _Object) -> None:
         """Let the object's box hold it where its parts are now; its cells stay as they are while they do."""
-        if made.program.margin >= 0:
-            low, high = self._hull(made)
-        else:
-            moves = {name: iter(_matrices(given)) for name, given in made.moves.items()}
-            shape: Any = made.implicit.shape
-            low, high = shape.moved(moves).box
+        made.moved = False
+        box = self._hull(made) if made.program.margin >= 0 else None
+        if box is None:
+            if not made.has_hull:
+                made.hull, made.has_hull = Hull.of(made.shape), True
+            moves = {name: _matrices(given) for name, given in made.moves.items()}
+            box = made.hull.box(moves) if made.hull else None
+            if box is None:
+                box = made.shape.moved({name: iter(given) for name, given in moves.items()}).box
+        low, high = box
         if (low >= made.box[0]).all() and (high <= made.box[1]).all():
             return
         spare = _SPARE * np.max(np.maximum(high, made.box[1]) - np.minimum(low, made.box[0]))
@@ -442,7 +475,7 @@ class Field(Closing):
             made.halves = 0.5 * (boxes[:, 1] - boxes[:, 0])
             made.middles = 0.5 * (boxes[:, 1] + boxes[:, 0])
         linear = made.placements[:, :3, :3]
-        if (linear == np.eye(3)).all():
+        if made.is_straight and not made.turned:
             middles, halves = made.middles + made.placements[:, :3, 3], made.halves
         else:
             middles = np.einsum("nij,nj->ni", linear, made.middles) + made.placements[:, :3, 3]
@@ -472,9 +505,7 @@ class Field(Closing):
                 self._slots[at + 3, 1] *= shape.lipschitz / leaf.shape.lipschitz
                 self._write(self._slot_buffer, self._slots[at + 1 : at + 4], 16 * (at + 1))
             made.halves = None
-            if made.program.margin >= 0:
-                self._fit(made)
-            made.dirty = True
+            made.dirty = made.moved = True
 
     def _jobs(self, index: int) -> list[Any]:
         """The divisions of an object, the coarse one first, each in as many parts as the marks take."""
@@ -509,13 +540,20 @@ class Field(Closing):
 
     def update(self) -> None:
         """Record the pruning of what has changed, before what asks the field."""
+        for made in self._objects:
+            if made.moved:
+                self._fit(made)
         dirty = [i for i, made in enumerate(self._objects) if made.dirty and made.levels]
         for made in self._objects:
             made.dirty = False
         if not dirty:
             return
         gpu = self._gpu
-        jobs = {i: self._jobs(i) for i in dirty}
+        jobs = {}
+        for i in dirty:
+            made = self._objects[i]
+            made.jobs = made.jobs or self._jobs(i)
+            jobs[i] = made.jobs
         listed = [job for made in jobs.values() for job in made]
         table = np.zeros(len(listed), gpu.dtype(_JOB))
         for number, job in enumerate(listed):

@@ -541,14 +541,14 @@ class Combination(Shape):
         pairings = math.ceil(math.log2(len(self.shapes)))
         if self.operation == "subtraction":
             return self.shapes[0].extent(level)
-        boxes = [shape.extent(level + self._swell * pairings) for shape in self.shapes]
+        boxes = [shape.extent(level + self.swell * pairings) for shape in self.shapes]
         lows, highs = np.array([low for low, _ in boxes]), np.array([high for _, high in boxes])
         if self.operation == "union":
             return lows.min(axis=0), highs.max(axis=0)
         return lows.max(axis=0), np.maximum(highs.min(axis=0), lows.max(axis=0))
 
     @property
-    def _swell(self) -> float:
+    def swell(self) -> float:
         """How much a pairing can take from the lesser of two values."""
         if self.operation != "union":
             return 0.0
