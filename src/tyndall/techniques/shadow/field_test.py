@@ -154,7 +154,7 @@ def test_soft_shadows_of_all_kinds_of_light_are_near_the_truth(gpu: Gpu, light: 
 
 @pytest.mark.parametrize("light", LIGHTS)
 def test_one_ray_is_as_hard_as_many(gpu: Gpu, light: Light) -> None:
-    """But for pixels at the edge, which a quarter of their width may move."""
+    """But for pixels at the edge, which a part of their width may move."""
     scene = Scene([props.floor(0, 4)], [light], ABOVE, implicits=FIELD)
     off = np.abs(received(gpu, scene, cones=1) - received(gpu, scene))[on_floor()]
     assert (off > 0.01).mean() < 0.005
@@ -163,22 +163,21 @@ def test_one_ray_is_as_hard_as_many(gpu: Gpu, light: Light) -> None:
 @pytest.mark.parametrize("turn", [0.0, 0.4])
 def test_one_ray_tells_a_thick_straight_edge(gpu: Gpu, turn: float) -> None:
     """On both sides of it. Of a thin sheet's penumbra only the lighter half, and darkness behind."""
-    camera = Camera((0, 0, -2), (0, 0, -3), fov=0.8, near=0.02)
+    camera = Camera((0, 0, -1.2), (0, 0, -3), fov=0.4, near=0.02)
     light = DirectionalLight((0, 0, -1), 1.0, angular_diameter=0.2)
     for thickness in (2.0, 0.01):
-        sheet = box((8, 16, thickness)).at(-4, 0, -2.5 + 0.5 * thickness).rotate(turn)
+        sheet = box((8, 16, thickness)).at(-4, 0, -1 + 0.5 * thickness).rotate(turn)
         fields = props.fields(Implicit(sheet), specks=BEHIND)
         got = received(gpu, Scene([props.wall(-3, 4)], [light], camera, implicits=fields), cones=1)
         seen = props.rays(camera, SIZE)
         points = seen.at((-3 - seen.origin[2]) / seen.directions[..., 2])
         across = points[..., 0] * math.cos(turn) + points[..., 1] * math.sin(turn)
-        edge = np.where(across < 0, 0.5, 0.5 + thickness)
+        edge = np.where(across < 0, 2.0, 2.0 + thickness)
         want = props.disk_part(across / (edge * math.tan(0.1)))
         off = got - want
-        sure = (across > 0.01) if thickness < 1 else (across > 0.01) | (across < -0.01)
+        sure = across > -0.2 if thickness > 1 else across > 0.01
         assert np.abs(off[sure]).max() < 0.1
-        assert got[across < -0.06].max() < 0.01
-        assert got[across > 0.3].min() > 0.98
+        assert got[across < -0.22].max() < 0.01
 
 
 @pytest.mark.parametrize("light", BIG)
