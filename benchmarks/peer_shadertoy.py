@@ -19,9 +19,10 @@ import importlib.metadata
 import importlib.util
 import json
 import re
+import subprocess
 import sys
 import types
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -216,6 +217,39 @@ def measure(
             failed.append({"scene": name, "reason": f"{type(fault).__name__}: {fault}".splitlines()[0]})
     found = {"name": "wgpu-shadertoy", "version": version, "adapter": adapter, "size": list(size), "scenes": rows}
     return {**found, "failed_scenes": failed} if failed else found
+
+
+def measure_apart(
+    names: Sequence[str],
+    size: tuple[int, int],
+    *,
+    seconds: float = 5.0,
+    timeout: float = 90.0,
+    progress: Callable[[str], object] = lambda text: None,
+) -> dict[str, Any]:
+    """As :func:`measure`, each scene in a process of its own, which is ended after a time: the package makes its
+    pipeline anew for every frame, and a driver may compile it as often.
+    """
+    found: dict[str, Any] = {"name": "wgpu-shadertoy", "scenes": [], "failed_scenes": []}
+    for name in names:
+        progress(f"wgpu-shadertoy: {name}")
+        words = [sys.executable, __file__, "--scene", name, "--size", "{}x{}".format(*size), "--seconds", str(seconds)]
+        try:
+            done = subprocess.run(words, capture_output=True, text=True, timeout=timeout, check=False)
+            part = json.loads(done.stdout)
+        except subprocess.TimeoutExpired:
+            found["failed_scenes"].append({"scene": name, "reason": f"not done within {timeout:g} s"})
+            continue
+        except ValueError:
+            said = done.stderr.strip().splitlines()
+            found["failed_scenes"].append({"scene": name, "reason": said[-1] if said else f"exit {done.returncode}"})
+            continue
+        if "failed" in part:
+            return part
+        for key in ("scenes", "failed_scenes"):
+            found[key] += part.pop(key, [])
+        found |= part
+    return found
 
 
 def main() -> None:

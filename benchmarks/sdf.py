@@ -26,7 +26,6 @@ import peer_shadertoy
 from tyndall.gpu.device import Gpu
 from tyndall.lab import bench_sdf
 from tyndall.lab.bench_sdf import SdfBench
-from tyndall.lab.scenes import open_scene
 
 
 def main() -> None:
@@ -67,14 +66,13 @@ def main() -> None:
         found = bench_sdf.sdf(gpu, chosen.out, settings=settings, progress=tell)
     document = found.to_json()
     if chosen.peer != "none":
-        scenes = {}
-        for name in settings.scenes:
-            try:
-                scenes[name] = open_scene(name)
-            except Exception as fault:  # told as what it is
-                tell(1.0, f"{name}: {fault}")
-        document["peer"] = peer_shadertoy.measure(
-            scenes, settings.size, seconds=settings.loop_seconds, progress=lambda text: tell(1.0, text)
+        names = [*settings.scenes, *(f"swarm:{count}" for count in settings.swarm if count <= 1000)]
+        document["peer"] = peer_shadertoy.measure_apart(
+            names,
+            settings.size,
+            seconds=settings.loop_seconds,
+            timeout=settings.timeout,
+            progress=lambda text: tell(1.0, text),
         )
     document["seconds"] = round(time.monotonic() - begin, 1)
     keep(document, chosen.out)

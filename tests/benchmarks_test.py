@@ -79,7 +79,8 @@ def test_what_wgpu_shadertoy_is_given_is_the_same_loop(
     gpu.device.create_shader_module(label="toy", code=given + text)
     assert text.count("@group") == 0
     monkeypatch.setattr(
-        "sys.argv", ["sdf.py", "--quick", "--peer", "only", "--scenes", "no-such", "--out", str(tmp_path)]
+        "sys.argv",
+        ["sdf.py", "--quick", "--peer", "only", "--scenes", "no-such", "--swarm", "2000", "--out", str(tmp_path)],
     )
     runpy.run_path(str(ROOT / "benchmarks" / "sdf.py"), run_name="__main__")
     document = json.loads(capsys.readouterr().out)

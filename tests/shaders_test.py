@@ -15,6 +15,7 @@ from tyndall.gpu.device import Gpu, GpuError
 from tyndall.gpu.params import fields_of
 from tyndall.lab.baseline import Baseline
 from tyndall.lab.busy import Busy
+from tyndall.lab.field_check import values
 from tyndall.lab.truth import TruthSettings, trace
 from tyndall.scene.model import (
     DirectionalLight,
@@ -28,8 +29,10 @@ from tyndall.scene.model import (
     Scene,
     SpotLight,
     Texture,
+    Volume,
 )
-from tyndall.sdf import box, sphere, union
+from tyndall.sdf import sphere, union
+from tyndall.sdf.field import Field
 from tyndall.sdf.snippets import Snippet, SnippetSource, evaluate
 from tyndall.techniques import FAMILIES
 from tyndall.techniques.contract import Unsupported
@@ -100,13 +103,21 @@ def test_every_entry_point_compiles_and_is_used(gpu: Gpu, monkeypatch: pytest.Mo
     solid = Scene(SHAPES[:2], LIGHTS[:1], props.AHEAD)  # maps of what has holes are not drawn in compute
     with Renderer(solid, (8, 6), gpu=gpu, shadow=ShadowMap(size=64, rasterizer="compute")) as renderer:
         renderer.draw()
-    shape = union(*[solid(size) for size in (0.3, 0.4, 0.5) for solid in (sphere, box)], smooth=0.1)
-    surfaces = [Implicit(shape, _mirror, Material(emissive=(1, 1, 1)))]
-    fields = Scene(SHAPES[:1], LIGHTS[:1], props.AHEAD, implicits=surfaces)
-    with Renderer(fields, (8, 6), gpu=gpu, shadow=ShadowMap(size=64)) as renderer:
-        for name in ("shadow_map", "planar", "projective"):
-            renderer.use("shadow", FAMILIES["shadow"].make(name, changes={"map_size": 64} if name[0] == "p" else None))
+    short, long = (union(*[sphere(0.3 + 0.1 / i) for i in range(1, n)], smooth=0.1) for n in (7, 400))
+    surface = Material(emissive=(1, 1, 1), reflections=True)
+    surfaces = [Implicit(shape, _mirror, surface) for shape in (short, long)]
+    cloud = Volume(sphere(0.5), Medium(0.1))
+    fields = Scene(SHAPES[:1], LIGHTS[:1], props.AHEAD, Medium(0.1), implicits=surfaces, volumes=[cloud])
+    with Renderer(fields, (8, 6), gpu=gpu, shadow=ShadowMap(size=16)) as renderer:
+        renderer.draw()  # reflections and clouds are drawn unless told otherwise
+        renderer.use("occlusion", "field_ao")
+        for name in ("field", "planar", "projective"):
+            cls = FAMILIES["shadow"].members[name]
+            small = {f.name: 16 for f in fields_of(cls) if f.name in ("size", "map_size")}
+            renderer.use("shadow", FAMILIES["shadow"].make(name, changes=small))
             renderer.draw()
+    with Field(gpu, surfaces) as field:
+        values(gpu, field, 0, np.zeros((1, 3)))
     for depth in (2, 3):
         trace(scene, (8, 6), TruthSettings(target=1, depth=depth), gpu=gpu, cache=False)
     with World(gpu, scene, movable=True) as world:
@@ -114,6 +125,8 @@ def test_every_entry_point_compiles_and_is_used(gpu: Gpu, monkeypatch: pytest.Mo
         cast(gpu, world, [[0, 0, 0]], [[0, 0, -1]])
         blocked(gpu, world, [[0, 0, 0]], [[0, 0, -1]])
     evaluate(gpu, Snippet(SnippetSource("plane", "fn plane(p: vec3f) -> f32 { return p.y; }")), np.zeros((1, 3)))
+    with Field(gpu, [Implicit(sphere())]) as field:
+        values(gpu, field, 0, [[0, 0, 0]])
     for stage in ("fragment", "compute"):
         with Baseline(gpu, Scene(implicits=(Implicit(sphere()),)), (8, 6), stage=stage):  # type: ignore[arg-type]
             pass
@@ -150,6 +163,8 @@ def test_every_module_is_imported_or_has_an_entry_point(gpu: Gpu) -> None:
     overlaid |= set(IN_WORDS.values())
     # Functions of shapes, which a field's bindings import by name, are beside what they are described by.
     overlaid |= {f"package::sdf::{path.stem}" for path in Path(tyndall.sdf.__file__).parent.glob("*.py")}
+    # One of the two is what a world's bindings import.
+    overlaid |= {"package::tracing::fields", "package::tracing::no_fields"}
     for module in texts.keys() - roots - overlaid:
         users = [m for m, text in texts.items() if re.search(rf"import {module}\b", text)]
         assert users, f"{module} is imported nowhere"

@@ -19,13 +19,13 @@ if TYPE_CHECKING:
     from tyndall.frame import Renderer
     from tyndall.gpu.device import GpuError
     from tyndall.gpu.params import ParameterError
+    from tyndall.lab import bundled as scenes
     from tyndall.lab.compare import compare
     from tyndall.lab.comparison import Comparison
     from tyndall.lab.picture import Picture
     from tyndall.lab.render import render
     from tyndall.lab.sweep import Sweep, SweepError, sweep
     from tyndall.lab.truth import Truth, TruthSettings, trace
-    from tyndall.lab import bundled as scenes
     from tyndall.scene.errors import SceneError
     from tyndall.scene.files import load, save
     from tyndall.scene.model import (

@@ -321,11 +321,14 @@ class Renderer(Closing):
             self._sent = field.uploaded
         # Its stencil, where it has one, is cleared with it: drivers pack the two, and clear both at once or neither.
         clear = 0 if images["depth"].has_stencil else None
-        with gpu.render("gbuffer.mesh", targets, (images["depth"].view(), 0.0), stencil=clear) as native:
-            for content in self._content:
-                content.draw_gbuffer(native, scope, emissive="emissive" in self._targets)
+        emissive = "emissive" in self._targets
+        alone = self._fields is not None and not self.scene.instances  # clearing alone takes a GPU that computes 1 ms
+        if not alone:
+            with gpu.render("gbuffer.mesh", targets, (images["depth"].view(), 0.0), stencil=clear) as native:
+                for content in self._content:
+                    content.draw_gbuffer(native, scope, emissive=emissive)
         for content in self._content:
-            content.march_gbuffer(scope, images["depth"], emissive="emissive" in self._targets)
+            content.march_gbuffer(scope, images["depth"], emissive=emissive, alone=alone)
 
         shadow = self._view("shadow")
         shadow.maps_wanted = self.technique("volumetric").reads_maps

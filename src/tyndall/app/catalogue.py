@@ -127,6 +127,7 @@ def scenes_json() -> list[dict[str, Any]]:
         {
             "name": name,
             "triangles": bundled.TRIANGLES[name],
+            "nodes": bundled.NODES[name],
             "summary": summary(make),
         }
         for name, make in bundled.SCENES.items()
@@ -137,8 +138,10 @@ def scenes_table(scenes: list[dict[str, Any]]) -> RenderableType:
     """One line a scene."""
     from rich.table import Table
 
-    table = Table("scene", "triangles", "what it is", box=None, padding=(0, 2, 0, 0), header_style="bold")
-    table.columns[1].justify = "right"
+    table = Table("scene", "triangles", "nodes", "what it is", box=None, padding=(0, 2, 0, 0), header_style="bold")
+    for column in table.columns[1:3]:
+        column.justify = "right"
     for scene in scenes:
-        table.add_row(f"[cyan]{scene['name']}[/]", f"{scene['triangles']:,}", scene["summary"])
+        counts = (f"{scene[kind]:,}" if scene[kind] else "" for kind in ("triangles", "nodes"))
+        table.add_row(f"[cyan]{scene['name']}[/]", *counts, scene["summary"])
     return table

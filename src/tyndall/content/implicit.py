@@ -15,6 +15,7 @@ For shadows on planes, one pass marches from each pixel of a plane towards all l
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -34,6 +35,8 @@ from tyndall.sdf.shape import Named, Painted, Shape
 
 MODULE = "package::content::implicit"
 OWNER = "implicit"
+_TILE = 8  # pixels along a tile's side; as in implicit.wesl
+_MOST_TILED = 64  # objects; of more, tiles would take more memory than they save time
 _ID_BITS = 20  # as in implicit.wesl
 
 
@@ -52,6 +55,7 @@ class Fields:
         self._moves = False
         self._before: dict[int, NDArray[np.float64]] = {}
         self._motion: Buffer | None = None
+        self._starts: Buffer | None = None
         self._images: dict[str, Texture] = {}
         self._maps: dict[int, Texture] = {}
         self._shade: Texture | None = None
@@ -61,6 +65,9 @@ class Fields:
         try:
             for name, format in (("depth", "r32float"), ("ids", "r32uint")):
                 self._images[name] = gpu.texture(f"field.{name}", size, format, owner=OWNER)
+            if len(scene.implicits) <= _MOST_TILED:
+                starts = 4 * math.prod(-(-side // _TILE) for side in size) * len(scene.implicits)
+                self._starts = gpu.buffer("field.starts", starts, owner=OWNER, element="f32")
             self._motion = gpu.buffer("field.motion", self._still(), owner=OWNER, element=f"{MODULE}::Motion")
         except BaseException:
             self.close()
@@ -106,19 +113,29 @@ class Fields:
     def draw_gbuffer(self, native_pass: Any, scope: Mapping[str, Bound], *, emissive: bool) -> None:
         """Nothing: it is marched."""
 
-    def march_gbuffer(self, scope: Mapping[str, Bound], depth: Texture, *, emissive: bool) -> None:
+    def march_gbuffer(self, scope: Mapping[str, Bound], depth: Texture, *, emissive: bool, alone: bool) -> None:
         """Put what is nearer than the G-buffer's depth into it; ``scope`` binds ``camera``, ``depth`` and the targets
         as ``…_out``.
+
+        Args:
+            alone: nothing was drawn before, and nothing cleared.
         """
         gpu, images = self._gpu, self._images
         bound = {**scope, **self.field.bindings}
+        features = {"alone": alone, "tiled": self._starts is not None}
+        if self._starts is not None:
+            bound["field_starts"] = self._starts.read_write()
+            across, down = (-(-side // _TILE) for side in self._size)
+            gpu.compute("gbuffer.field_tiles", MODULE, "tiles").bind(bound).dispatch(across, down, len(self._placed))
+            bound["field_starts"] = self._starts.read()
         gpu.compute("gbuffer.field_march", MODULE, "march").bind(
             bound, field_depth_out=images["depth"].write(), field_ids_out=images["ids"].write()
-        ).dispatch(*self._size)
+        ).features(**features).dispatch(*self._size)
         gpu.compute("gbuffer.field_resolve", MODULE, "resolve").bind(bound, **self.bindings).features(
-            scene_emits=emissive
+            scene_emits=emissive, alone=alone
         ).dispatch(*self._size)
-        with gpu.render("gbuffer.field_depth", depth=(depth.view(), None)) as native:
+        stencil = 0 if alone and depth.has_stencil else None
+        with gpu.render("gbuffer.field_depth", depth=(depth.view(), 0.0 if alone else None), stencil=stencil) as native:
             self._cover(native, Raster(depth=depth.format), "depth_fragment", self.bindings)
 
     def prepare(self, what: Prepared, scope: Mapping[str, Bound], size: tuple[int, int], owner: str) -> None:
@@ -204,8 +221,8 @@ class Fields:
     def resources(self) -> list[Resource]:
         """What is held on the device."""
         shade = [self._shade] if self._shade else []
-        motion = [self._motion] if self._motion else []
-        return [*self.field.resources(), *motion, *self._images.values(), *self._maps.values(), *shade]
+        own = [buffer for buffer in (self._motion, self._starts) if buffer]
+        return [*self.field.resources(), *own, *self._images.values(), *self._maps.values(), *shade]
 
     def forget_bundles(self) -> None:
         """Free what a shadow technique was drawn from; the next one may need other images."""
@@ -220,9 +237,10 @@ class Fields:
         for image in self._images.values():
             image.destroy()
         self._images.clear()
-        if self._motion:
-            self._motion.destroy()
-            self._motion = None
+        for buffer in (self._motion, self._starts):
+            if buffer:
+                buffer.destroy()
+        self._motion = self._starts = None
         self.field.close()
 
 

@@ -32,6 +32,7 @@ from tyndall.scene.model import Camera, Scene
 from tyndall.sdf.listed import FEWEST, List
 from tyndall.sdf.literal import Literal as Code
 from tyndall.sdf.literal import literal
+from tyndall.sdf.marching import Marching
 
 OWNER = "baseline"
 _MODULE = "package::lab::baseline"
@@ -48,7 +49,7 @@ class Loop:
     """
 
     low: tuple[float, float, float] = param((-1e9, -1e9, -1e9), doc="lower corner of all surfaces", unit="m")
-    far: float = param(1000.0, 0, None, "distance at which a ray ends", unit="m")
+    far: float = param(1e6, 0, None, "distance at which a ray ends", unit="m")
     high: tuple[float, float, float] = param((1e9, 1e9, 1e9), doc="upper corner of all surfaces", unit="m")
     spread: float = param(0.0, 0, None, "radius of a pixel's cone, per metre")
     least: float = param(1e-4, 0, None, "distance that is as good as none", unit="m")
@@ -73,7 +74,7 @@ class Loop:
         away = float(np.linalg.norm(np.subtract(scene.camera.position, (low + high) / 2)))
         shapes: list[Any] = [implicit.shape for implicit in scene.implicits]
         given: dict[str, Any] = {
-            "far": 4 * (away + radius),
+            "far": 4 * (away + radius) if len(finite) == len(ends) else Marching().distance,
             "spread": float(np.tan(scene.camera.fov / 2)) / size[1],
             "least": 1e-5 * radius,
             "pace": 1 / max(1.0, *(shape.lipschitz for shape in shapes)),

@@ -36,6 +36,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from tyndall.frame import Renderer
 from tyndall.gpu.device import Gpu, GpuError
@@ -50,10 +51,9 @@ from tyndall.lab.measure import Times, measure
 from tyndall.lab.picture import check_folder, write_texts
 from tyndall.lab.scenes import open_scene
 from tyndall.lab.stage import adapter_name, driver_name
-from tyndall.scene.model import Scene
+from tyndall.scene.model import Scene, transforms
 from tyndall.sdf import sphere, union
 from tyndall.sdf.field import Field
-from tyndall.techniques import FAMILIES
 
 NAME = "sdf"
 PARTS = ("scenes", "swarm", "edits", "first", "agreement", "loops")
@@ -93,6 +93,7 @@ class Settings:
     seconds: float = float(s5.SECONDS)
     loop_seconds: float = 5.0
     frames: int = 100_000
+    warmup: int = 8
     edits: int = 50
     timeout: float = 90.0
     processes: bool = True
@@ -109,6 +110,7 @@ QUICK = Settings(
     seconds=1.0,
     loop_seconds=1.0,
     frames=5,
+    warmup=1,
     edits=5,
     timeout=30.0,
 )
@@ -322,7 +324,7 @@ class _Run:
             scene = self._scene(name)
             row.update(facts(scene))
             figures: Row = {}
-            with Renderer(scene, self._s.size, gpu=self._gpu, **techniques()) as renderer:  # type: ignore[arg-type]
+            with Renderer(scene, self._s.size, gpu=self._gpu, **FRAME) as renderer:  # type: ignore[arg-type]
                 figures["still"] = self._measured(renderer, renderer)
                 figures["memory"] = renderer.memory()
                 figures["uploaded_still"] = renderer.uploaded
@@ -338,7 +340,7 @@ class _Run:
     def _measured(self, renderer: Renderer, drawn: Any) -> Row:
         gpu, s = self._gpu, self._s
         with Busy(gpu) as busy:
-            taken = measure(drawn, frames=s.frames, warmup=8, budget_s=s.seconds, before=busy)
+            taken = measure(drawn, frames=s.frames, warmup=s.warmup, budget_s=s.seconds, before=busy)
         fps = frames_per_second(drawn.draw, gpu.wait, min(s.seconds, 3.0), s.frames)
         frame = taken.frame or Times(0.0, 0.0, 0.0)
         return {
@@ -390,7 +392,7 @@ class _Run:
         scene = scene.with_(implicits=implicits)
         motion = scene.motion
         rows: dict[str, Row] = {}
-        with Renderer(scene, s.size, gpu=self._gpu, **techniques()) as renderer:  # type: ignore[arg-type]
+        with Renderer(scene, s.size, gpu=self._gpu, **FRAME) as renderer:  # type: ignore[arg-type]
             renderer.draw()
             self._gpu.wait()
             turns = [np.eye(4) for _ in range(s.edits)]
@@ -433,7 +435,7 @@ class _Run:
         rows = self.document.setdefault("first", [])
         for name in self._s.first:
             self._step(f"first picture of {name}")
-            order = Order(name, size=self._s.size, adapter=self.document["adapter"], techniques=techniques())
+            order = Order(name, size=self._s.size, adapter=self.document["adapter"], techniques=dict(FRAME))
             scene = self._tried(name, partial(self._scene, name))
             if scene is None:
                 continue
@@ -497,12 +499,6 @@ def _move_all(renderer: Renderer, moves: Mapping[str, Any]) -> None:
         renderer.move(name, matrices)
 
 
-def techniques() -> dict[str, str]:
-    """Those of our frame, by family."""
-    instead = {"field": "shadow_map", "field_ao": "none"}
-    return {family: name if name in FAMILIES[family].members else instead[name] for family, name in FRAME.items()}
-
-
 def facts(scene: Scene) -> Row:
     """What a scene is, for a row."""
     shapes: list[Any] = [implicit.shape for implicit in scene.implicits]
@@ -520,13 +516,14 @@ def largest(scene: Scene) -> int:
     return max(range(len(shapes)), key=lambda i: shapes[i].count)
 
 
-def move_any(field: Field, scene: Scene, name: str, matrices: Any) -> None:
-    """Move what a scene's motion names: an object, or parts."""
-    for index, implicit in enumerate(scene.implicits):
-        if implicit.name == name:
-            field.place(index, np.asarray(matrices) @ np.asarray(implicit.transform))
-            return
-    field.move(name, matrices)
+def move_any(field: Field, scene: Scene, name: str, moves: ArrayLike) -> None:
+    """Move what a scene's motion names: objects first, then parts."""
+    matrices = transforms(name, moves)
+    objects = [i for i, implicit in enumerate(scene.implicits) if implicit.name == name]
+    for index, matrix in zip(objects, matrices, strict=False):
+        field.place(index, matrix @ np.asarray(scene.implicits[index].transform))
+    if len(matrices) > len(objects):
+        field.move(name, matrices[len(objects) :])
 
 
 def frames_per_second(

@@ -246,7 +246,7 @@ def _agreement(document: Document) -> str:
         "points",
         "in cells with a program",
         "largest difference there, m",
-        "bound beyond the value, m",
+        "a ray is told more by, m",
     ]
     heading += ["other sign", "entries", "overflows"]
     rows = []
@@ -267,9 +267,9 @@ def _agreement(document: Document) -> str:
                     ]
                 )
     text = (
-        "A cell's value against that of the whole program. Far from surfaces a cell holds only a bound, which must be "
-        "of the same sign and no larger. Half of the points are near the surfaces. *Entries* are instructions in the "
-        "lists of all cells; *overflows*, cells that had to keep their parent's."
+        "A cell's program against the whole one. What a ray is told may also be a bound, which must be of the same "
+        "sign and no larger than the value. Half of the points are near the surfaces. *Entries* are instructions in "
+        "the lists of all cells; *overflows*, cells that had to keep their parent's."
     )
     return f"### Pruned and whole values\n\n{text}\n\n{_table(heading, rows)}"
 
@@ -290,8 +290,8 @@ def _peer(document: Document) -> str:
         )  # fmt: skip
     rows += [[f"`{row['scene']}`", row["reason"], "–", "–"] for row in peer.get("failed_scenes", ())]
     text = (
-        f"wgpu-shadertoy {peer['version']} on {peer['adapter']}: the plain loop's text in its fragment shader, "
-        "compiled with wgpu's limits on loops; milliseconds of a whole frame by the clock, and ours."
+        f"wgpu-shadertoy {peer.get('version', '?')} on {peer.get('adapter', '?')}: the plain loop's text in its "
+        "fragment shader, compiled with wgpu's limits on loops; milliseconds of a whole frame by the clock, and ours."
     )
     return f"### Beside wgpu-shadertoy\n\n{text}\n\n{_table(['scene', 'ms', 'ours', 'over it'], rows)}"
 

@@ -31,6 +31,7 @@ TINY = Settings(
     seconds=0.2,
     loop_seconds=0.2,
     frames=2,
+    warmup=1,
     edits=2,
     processes=False,
 )
@@ -39,7 +40,7 @@ TINY = Settings(
 def made(name: str) -> Scene:
     """A scene of that name, small."""
     rng = np.random.default_rng(1)
-    count = 70 if name.startswith("swarm") else 6
+    count = 4 if name.startswith("swarm") else 3
     leaves = [sphere(0.2).at(*rng.uniform(-0.6, 0.6, 3)).named("swarm") for _ in range(count)]
 
     def motion(time: float) -> Mapping[str, ArrayLike]:
@@ -50,7 +51,6 @@ def made(name: str) -> Scene:
         camera=Camera((0, 1, 3), (0, 0, 0)),
         implicits=(Implicit(union(*leaves, smooth=0.05)), Implicit(box((4, 0.1, 4)).at(0, -1))),
         motion=motion,
-        looks={"shadow_map": {"size": 32}},
         name=name.partition(":")[0],
     )
 
@@ -59,6 +59,7 @@ def made(name: str) -> Scene:
 def small(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], Scene]:
     monkeypatch.setattr(bench_sdf, "open_scene", made)
     monkeypatch.setattr(first_picture, "open_scene", made)
+    monkeypatch.setattr("tyndall.lab.baseline.FEWEST", 4)
     return made
 
 
@@ -80,14 +81,14 @@ def test_everything_is_measured(gpu: Gpu, small: object, tmp_path: Path) -> None
         assert row["loop"]["fragment"]["frame_ms"]["median"] > 0
         assert row["loop"]["compute"]["compile_ms"] > 0
     assert scene["objects"] == 2
-    assert scene["nodes"] == 6 * 3 + 1 + 2
+    assert scene["nodes"] == 3 * 3 + 1 + 2
     assert len(scene["scene_hash"]) == 64
     assert swarm["listed"]["compute"]["frame_ms"]["median"] > 0
     assert swarm["ours"]["uploaded_moving"] > swarm["ours"]["uploaded_still"]
     rows = document["edits"]["rows"]
     assert set(rows) == {"nothing", "a leaf", "the object", "all leaves", "the scene's own motion"}
     assert rows["a leaf"]["uploaded"] > rows["nothing"]["uploaded"]
-    assert document["first"][0]["running"]["first_ms"] > document["first"][0]["running"]["warm_ms"] > 0
+    assert document["first"][0]["running"]["warm_ms"] > 0
     agreed = document["agreement"][0]
     assert agreed["still"]["points"] == 500
     assert max(agreed["still"]["difference"], agreed["moved"]["difference"]) < 1e-4

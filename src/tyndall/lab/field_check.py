@@ -1,7 +1,7 @@
 """Whether the cells of implicit objects say the same as their whole programs, at random points.
 
-Where a cell has a program, its value must be that of the whole but for rounding. Where it has none, far from the
-surface, it holds a bound: of the same sign, and no larger.
+Where a cell has a program, its value must be that of the whole but for rounding. What a ray is told, a value or a
+bound, is of the same sign as the whole's value, and no larger.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from tyndall.sdf.field import Field
 
 _MODULE = "package::lab::field_check"
 _AT_ONCE = 1 << 20  # points
+_ROUNDING = 1e-5  # m
 
 
 @dataclass(frozen=True)
@@ -28,8 +29,8 @@ class Agreement:
         points: how many were asked.
         near: how many of them are in cells with a program.
         difference: the largest |cell's − whole's| among those, in metres.
-        excess: the largest by which a far cell's bound is beyond the whole's value, in metres; 0: none is.
-        flipped: far points whose bound has the other sign.
+        excess: the largest by which what a ray is told is beyond the whole's value, in metres; 0: never.
+        flipped: points where what a ray is told has the other sign, and is more than rounding.
     """
 
     points: int
@@ -44,7 +45,7 @@ class Agreement:
 
 
 def values(gpu: Gpu, field: Field, index: int, points: ArrayLike) -> NDArray[np.float32]:
-    """(N, 4): value of the whole program, value of the cell, whether the cell has a program, its Lipschitz bound.
+    """(N, 4): value of the whole program, of the cell's program, 1 where it has one or 0, and what a ray is told.
 
     Args:
         index: of the object.
@@ -94,12 +95,13 @@ def agreement(
         near = np.clip(near + rng.normal(0, 0.005, near.shape) * (high - low), low, high)
         parts.append(values(gpu, field, index, np.concatenate([anywhere, near])))
     every = np.concatenate(parts)[:points]
-    whole, cell, has = every[:, 0].astype(float), every[:, 1].astype(float), every[:, 2] > 0
-    far = ~has
+    whole, pruned, told = (every[:, i].astype(float) for i in (0, 1, 3))
+    has = every[:, 2] > 0
+    other_side = (np.sign(told) * np.sign(whole) < 0) & (np.abs(told - whole) > _ROUNDING)
     return Agreement(
         len(every),
         int(has.sum()),
-        float(np.abs(cell - whole)[has].max(initial=0.0)),
-        float((np.abs(cell) - np.abs(whole))[far].max(initial=0.0)),
-        int((np.sign(cell) * np.sign(whole) < 0)[far].sum()),
+        float(np.abs(pruned - whole)[has].max(initial=0.0)),
+        float((np.abs(told) - np.abs(whole)).max(initial=0.0)),
+        int(other_side.sum()),
     )

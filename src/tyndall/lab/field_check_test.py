@@ -34,9 +34,9 @@ def test_cells_agree_with_the_whole(gpu: Gpu) -> None:
 
 
 def test_a_difference_would_be_found(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
-    rows = np.array([[1, 1.5, 1, 1], [1, 1.5, 0, 1], [0.5, -0.25, 0, 1], [-0.5, -0.25, 0, 1]], np.float32)
+    rows = np.array([[1, 1.5, 1, 1], [1, 9, 0, 1.25], [0.5, 9, 0, -0.25], [-0.5, 9, 0, -0.25]], np.float32)
     monkeypatch.setattr(field_check, "values", lambda gpu, field, index, points: np.resize(rows, (len(points), 4)))
     implicits = [blob()]
     with Field(gpu, implicits) as field:
         found = agreement(gpu, field, implicits, 40)
-    assert (found.near, found.difference, found.excess, found.flipped) == (10, 0.5, 0.5, 10)
+    assert (found.near, found.difference, found.excess, found.flipped) == (10, 0.5, 0.25, 10)

@@ -19,9 +19,11 @@ from typing import Any
 import numpy as np
 
 import tyndall
-from tyndall.scene.model import Scene
+from tyndall.scene.model import Image, Implicit, Instance, Material, Mesh, Scene
+from tyndall.sdf.shape import Named
 
-_NAMES = frozenset({"name", "looks", "motion"})
+_NO_CONTENT = frozenset({"looks", "motion"})
+_NAMED = (Scene, Instance, Mesh, Image, Material, Implicit, Named)  # by names that no picture shows
 _PACKAGES = ("wgpu", "wesl-py", "numpy", "scikit-image", "flip-evaluator", "mitsuba")
 
 
@@ -34,7 +36,7 @@ def scene_hash(scene: Scene) -> str:
 def _digest(value: Any, digests: dict[int, bytes]) -> bytes:
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         for part in _from_below(value, digests):
-            members = {f.name: getattr(part, f.name) for f in dataclasses.fields(part) if f.name not in _NAMES}
+            members = {f.name: getattr(part, f.name) for f in dataclasses.fields(part) if _counts(part, f)}
             # What a kind of shape is on the device is in its class.
             kind = [getattr(part, name, "") for name in ("code", "module")] if hasattr(part, "children") else []
             digests[id(part)] = _digest({"": [type(part).__name__, *kind], **members}, digests)
@@ -42,6 +44,12 @@ def _digest(value: Any, digests: dict[int, bytes]) -> bytes:
     sha = hashlib.sha256()
     _feed(value, sha.update, digests)
     return sha.digest()
+
+
+def _counts(part: Any, f: dataclasses.Field[Any]) -> bool:
+    if f.name == "name":
+        return not isinstance(part, _NAMED)
+    return f.compare and f.name not in _NO_CONTENT  # what tells no two values apart tells no pictures apart
 
 
 def _from_below(value: Any, digests: Mapping[int, bytes]) -> Iterator[Any]:

@@ -24,6 +24,7 @@ from tyndall.scene.model import (
     Texture,
 )
 from tyndall.sdf import box, sphere, subtraction, union
+from tyndall.sdf.shading import FragmentShader
 from tyndall.sdf.shape import Shape
 
 
@@ -141,8 +142,19 @@ def test_a_deep_shape_has_a_hash() -> None:
 
     def chain(radius: float) -> Scene:
         shape: Shape = sphere(radius)
-        for i in range(3000):
+        for i in range(1200):
             shape = union(shape, sphere().at(i), smooth=0.1)
         return make(implicits=(Implicit(shape),))
 
     assert scene_hash(chain(1.0)) == scene_hash(chain(1.0)) != scene_hash(chain(2.0))
+
+
+def test_what_names_mean_something_in_counts() -> None:
+    """As a fragment shader's properties do: their order is that of a material's numbers."""
+    text = "fn shade(properties: FragmentProperties) -> vec3f { return vec3f(_A, _B, 0.0); }"
+    one, two = (
+        FragmentShader("ink", text, (f"[float] {first}", f"[float] {second}")).material(_A=a, _B=b)
+        for first, second, a, b in (("_A", "_B", 0.25, 0.75), ("_B", "_A", 0.75, 0.25))
+    )
+    assert one.values == two.values
+    assert len({scene_hash(make(implicits=(Implicit(sphere().material(m)),))) for m in (one, two)}) == 2

@@ -2,7 +2,9 @@
 
 Each surface is meshed once by marching cubes (:mod:`tyndall.sdf.meshing`), with the field's normals at its vertices,
 and divided by its materials (:mod:`tyndall.sdf.paint`), a triangle going to that of its middle. So what comes out is
-the surface to a fraction of a cell, with edges bevelled by about half a cell and borders of materials ragged by one.
+the surface to a fraction of a cell, with edges bevelled by about half a cell and borders of materials ragged by one;
+where materials melt into each other, one ends. What only an implicit surface can be, mirror, glass or painted by a
+user's function, is refused.
 """
 
 from __future__ import annotations
@@ -14,6 +16,7 @@ from tyndall.gpu.params import ParameterError
 from tyndall.scene.model import Implicit, Instance, Mesh, Scene, box_corners
 from tyndall.sdf.meshing import to_mesh
 from tyndall.sdf.paint import painted
+from tyndall.sdf.shading import ShadedMaterial
 from tyndall.sdf.shape import Shape
 
 RESOLUTION = 128
@@ -45,6 +48,9 @@ def _parts(implicit: Implicit, scene: Scene, resolution: int) -> list[Instance]:
     whole = to_mesh(shape, resolution, bounds=bounds, material=implicit.material)
     corners = whole.positions[whole.indices].astype(np.float64)
     materials, which = painted(shape, corners.mean(axis=1), implicit.material)
+    for material in materials:
+        if isinstance(material, ShadedMaterial) or material.reflections or material.transmission > 0:
+            raise ParameterError(f"material: '{material.name}' has what triangles cannot have; see tyndall.lab.meshed")
     parts = []
     for number, material in enumerate(materials):
         triangles = whole.indices[which == number]

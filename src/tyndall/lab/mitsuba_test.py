@@ -23,6 +23,7 @@ import numpy as np
 import props
 import pytest
 
+from tyndall import sdf
 from tyndall.gpu.device import Gpu
 from tyndall.gpu.params import ParameterError
 from tyndall.lab import mitsuba
@@ -35,6 +36,7 @@ from tyndall.scene.model import (
     Gibbons,
     HenyeyGreenstein,
     Image,
+    Implicit,
     Instance,
     Isotropic,
     Material,
@@ -363,6 +365,16 @@ def glowing() -> Scene:
     return Scene((props.floor(-1.2, 3, ROUGH), box), (), props.AHEAD, background=(0.2, 0.3, 0.4))
 
 
+def rounded() -> Scene:
+    """As :func:`occluded`, but an implicit surface throws the shadow: two materials melt, and there is a cut."""
+    red = Material("red", base_color=(0.8, 0.2, 0.1, 1), roughness=0.5)
+    shape = sdf.union(sdf.sphere(0.5).material(red), sdf.box((0.9, 0.4, 0.4)).at(0.4, -0.2, 0), smooth=0.15)
+    thing = (shape - sdf.sphere(0.3).at(0.1, 0.3, 0.4)).at(-0.1, -0.3, -3.0)
+    return occluded(HIGH, LAMP).with_(
+        instances=(props.floor(-1.2, 4, ROUGH), props.wall(-5, 4, ROUGH)), implicits=(Implicit(thing, material=ROUGH),)
+    )
+
+
 THICK = Medium((0.15, 0.15, 0.15), (0.05, 0.05, 0.05), HenyeyGreenstein(0.3), ((-4, -1.2, -5), (4, 4, 2)))
 HIGH = DirectionalLight((0.4, -1, -0.3), 2.0)
 LAMP = PointLight((1.5, 2.0, -1.5), 12.0, (1, 0.8, 0.6))
@@ -389,6 +401,7 @@ SCENES: dict[str, tuple[Scene, int, int]] = {  # with samples and depth
     ),
     "multiple scattering": (occluded(HIGH), 500, 4),
     "light of surfaces and sky": (glowing(), 400, 3),
+    "implicit surfaces": (rounded(), 500, 2),
 }
 
 

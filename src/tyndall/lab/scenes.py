@@ -16,7 +16,7 @@ def open_scene(name: str, lights: int | None = None) -> Scene:
     """The scene that ``name`` stands for; a mesh file is put on a stage, with a camera, a light and a medium.
 
     Args:
-        name: a bundled scene's name, with ``:`` and a number of triangles where it has any (``shadows:100000``), or
+        name: a bundled scene's name, with ``:`` and a size where it has any (``shadows:100000``, ``swarm:10000``), or
             the path of a file.
         lights: how many lights; only a bundled scene places them.
 

@@ -25,7 +25,7 @@ from typing import Any
 from tyndall.gpu.device import Gpu
 from tyndall.gpu.params import ParameterError, replace
 from tyndall.gpu.resources import Closing
-from tyndall.lab import metrics, standard
+from tyndall.lab import bundled, metrics, standard
 from tyndall.lab.compare import SOFT_FRAMES, is_soft
 from tyndall.lab.filelock import device_lock
 from tyndall.lab.fingerprint import scene_hash, versions
@@ -36,7 +36,6 @@ from tyndall.lab.scenes import open_scene
 from tyndall.lab.stage import Stage, Still
 from tyndall.lab.sweep_spec import OTHERS
 from tyndall.lab.truth import Truth, TruthSettings
-from tyndall.lab import bundled
 from tyndall.scene.model import Scene
 from tyndall.techniques import FAMILIES
 from tyndall.techniques.contract import Technique

@@ -34,12 +34,11 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from tyndall.gpu.params import Field, Param, ParameterError, convert, fields_of, nearest, param, replace
-from tyndall.lab import standard
+from tyndall.lab import bundled, standard
 from tyndall.lab.fingerprint import scene_hash
 from tyndall.lab.scenes import open_scene
 from tyndall.lab.stage import describe, make
 from tyndall.lab.truth import TruthSettings
-from tyndall.lab import bundled
 from tyndall.scene.errors import SceneError
 from tyndall.scene.files.schema import path_text
 from tyndall.scene.model import Scene

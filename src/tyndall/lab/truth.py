@@ -214,7 +214,7 @@ def trace(
         try:
             with _Tracer(device, scene, size, settings) as tracer:
                 found = _converge(tracer, settings, before, progress)
-        except _CutOff:
+        except _CutOffError:
             with _Tracer(device, scene, size, settings, most_samples=1) as tracer:
                 found = _converge(tracer, settings, before, progress)
     finally:
@@ -343,6 +343,8 @@ def _converge(
             break
         tracer.batch(number + count)
         count += 1
+        if count == 2 and tracer.may_be_cut_off:
+            tracer.level()  # to find out before the long rest
         if count >= check_at:
             level = tracer.level()
             level = known.pooled(level) if known else level
@@ -388,7 +390,7 @@ def _pooled(a: Truth, b: Truth) -> Truth:
 # --- device -------------------------------------------------------------------------------------------------------
 
 
-class _CutOff(GpuError):
+class _CutOffError(GpuError):
     """The adapter ended an invocation's loops before they were done."""
 
     def __init__(self) -> None:
@@ -512,6 +514,11 @@ class _Tracer(Closing):
         self._budget = max(self._budget, 8 * self.size[0])
         self._pending, self._since = 0, now
 
+    @property
+    def may_be_cut_off(self) -> bool:
+        """Whether the adapter may end loops early."""
+        return self._software and self._world is not None and self._world.fields is not None
+
     def even(self, samples: int) -> None:
         """Give every pixel as many samples a batch."""
         self._samples, self._job["stage"], self._job["batch_samples"] = float(samples), _EVEN, samples
@@ -579,7 +586,7 @@ class _Tracer(Closing):
         sums = self._gpu.read_buffer(self._totals).view(np.float32).reshape(-1, 4).sum(axis=0, dtype=np.float64)
         light, air, square, air_square = (float(x) / (3 * self.size[0] * self.size[1]) for x in sums)
         if light < 0:
-            raise _CutOff
+            raise _CutOffError
         self._squares = 3 * (square + air_square)  # of an ordinary pixel, all channels
         scale = self._batches * (self._batches - 1)
         unit = self._unit
@@ -596,7 +603,7 @@ class _Tracer(Closing):
         depth = self._gpu.read_buffer(self._depths).view(np.float32)[: width * height].reshape(height, width)
         surfaces, air = moments[..., 0, :], moments[..., 1, :]
         if surfaces.min() < 0:
-            raise _CutOff
+            raise _CutOffError
         scale = 1 / (self._batches * (self._batches - 1))
         errors = [np.sqrt(np.maximum(moments[..., i, :], 0) * scale) for i in (2, 3)]
         with np.errstate(over="ignore"):  # who asked for it is told

@@ -12,9 +12,19 @@ from tyndall.gpu.device import Gpu, GpuError
 from tyndall.lab import truth as module
 from tyndall.lab.meshed import meshed
 from tyndall.lab.truth import Truth, TruthSettings, trace, unit_of
-from tyndall.lab.ztest import z_test
-from tyndall.scene.model import Camera, DirectionalLight, HenyeyGreenstein, Implicit, Material, Medium, PointLight, Scene
+from tyndall.scene.model import (
+    Camera,
+    DirectionalLight,
+    HenyeyGreenstein,
+    Implicit,
+    Material,
+    Medium,
+    PointLight,
+    Scene,
+)
 from tyndall.sdf import box, sphere, union
+from tyndall.techniques.shadow.ray_traced import RayTraced
+from tyndall.techniques.shadow.shadow_map import ShadowMap
 
 ROUGH = Material("rough", base_color=(0.8, 0.7, 0.6, 1), roughness=0.9)
 RED = Material("red", base_color=(0.8, 0.1, 0.1, 1), roughness=0.4)
@@ -30,7 +40,8 @@ def traced(gpu: Gpu, scene: Scene, settings: TruthSettings = ONCE, size: tuple[i
 def test_a_ball_in_the_sun_is_shaded_as_the_closed_form_says(gpu: Gpu, scale: float) -> None:
     """To the terminator and beyond it: neither its own march's reach nor its normals darken or brighten it."""
     camera = Camera((0, 0, 4 * scale), (0, 0, 0), fov=0.6, near=0.01 * scale)
-    ball = Implicit(sphere(scale), material=ROUGH)
+    # (What is out of sight makes the shader that of the next test, which then need not be compiled.)
+    ball = Implicit(sphere(scale) | box(0.1 * scale).at(0, -50 * scale, 0), material=ROUGH)
     size = (48, 36)
     found = traced(gpu, Scene((), (SUN,), camera, implicits=[ball]), size=size)
     seen = props.rays(camera, size)
@@ -52,7 +63,7 @@ def test_a_ball_in_the_sun_is_shaded_as_the_closed_form_says(gpu: Gpu, scale: fl
 def test_a_balls_shadow_on_a_slab_is_where_geometry_says(gpu: Gpu) -> None:
     """Both are one object; and the lamp is of a place."""
     camera = Camera((0, 3, 3), (0, 0, 0), fov=0.8)
-    slab = box((6.0, 0.5, 6.0)).at(0, -0.25, 0) | sphere(0.4).at(0, 0.7, 0)
+    slab = sphere(0.4).at(0, 0.7, 0) | box((6.0, 0.5, 6.0)).at(0, -0.25, 0)
     lamp = PointLight((1.0, 3.0, 0.5), 30.0)
     size = (48, 36)
     found = traced(gpu, Scene((), (lamp,), camera, implicits=[Implicit(slab, material=ROUGH)]), size=size)
@@ -74,7 +85,7 @@ def test_a_balls_shadow_on_a_slab_is_where_geometry_says(gpu: Gpu) -> None:
     np.testing.assert_allclose(found.radiance[clear], expected[clear], rtol=2e-3, atol=2e-3 * expected.max())
 
 
-def still_life(medium: Medium | None = None) -> Scene:
+def still_life() -> Scene:
     """Rounded things of several materials, a cut among them, over a floor of triangles."""
     shape = union(
         sphere(0.5).material(RED) - sphere(0.3).at(0.1, 0.4, 0.2),
@@ -86,40 +97,35 @@ def still_life(medium: Medium | None = None) -> Scene:
         [props.floor(-0.5, 4, ROUGH)],
         lights,
         Camera((0, 0.8, 2.6), (0.2, -0.1, 0), fov=0.7),
-        medium or Medium(),
+        Medium((0.1, 0.15, 0.2), (0.02, 0.02, 0.02), HenyeyGreenstein(0.3), ((-3, -0.5, -3), (3, 2, 3))),
         background=(0.1, 0.2, 0.3),
         ambient=(0.05, 0.05, 0.05),
         implicits=[Implicit(shape, material=ROUGH)],
     )
 
 
-@pytest.mark.parametrize("depth", [2, 3])
-def test_it_is_the_truth_of_the_same_scene_of_triangles(gpu: Gpu, depth: int) -> None:
-    """Direct light and air, then bounces too; but for the triangles' own error along rims."""
-    air = Medium((0.1, 0.15, 0.2), (0.02, 0.02, 0.02), HenyeyGreenstein(0.3), ((-3, -0.5, -3), (3, 2, 3)))
-    scene = still_life(air if depth == 2 else None)
-    settings = TruthSettings(target=0.0, samples=128 if depth == 2 else 64, depth=depth)
+def test_it_is_the_truth_of_the_same_scene_of_triangles(gpu: Gpu) -> None:
+    """Direct light, air and bounces; but for the triangles' own error along rims."""
+    scene, settings = still_life(), TruthSettings(target=0.0, samples=64, depth=3)
     one, two = (traced(gpu, s, settings, (24, 18)) for s in (scene, meshed(scene, 96)))
-    alike = np.abs(one.depth - two.depth) < 2e-4 * two.depth
+    with np.errstate(invalid="ignore"):
+        alike = np.abs(one.depth - two.depth) < 2e-4 * two.depth
     alike |= np.isinf(one.depth) & np.isinf(two.depth)
     assert alike.mean() > 0.97
     assert (one.depth[alike] < two.depth.max()).sum() > 100
-    result = z_test(
-        one.radiance[alike],
-        two.radiance[alike],
-        one.radiance_error[alike],
-        two.radiance_error[alike],
-        a_freedom=one.freedom,
-        b_freedom=two.freedom,
-        tolerance=4e-3,
-    )
-    assert result, str(result)
+    scale = float(two.radiance.mean())
+    off = np.abs(one.radiance - two.radiance)[alike].max(axis=-1)
+    error = np.hypot(one.radiance_error, two.radiance_error)[alike].max(axis=-1)
+    assert np.sqrt(np.mean(error**2)) < 0.1 * scale
+    assert (off > 5 * error + 0.01 * scale).mean() < 0.01, "a rim's shadow may miss a pixel"
+    assert one.radiance[alike].mean() == pytest.approx(float(two.radiance[alike].mean()), rel=3e-3)
+    assert one.inscattered.mean() == pytest.approx(float(two.inscattered.mean()), rel=1e-2)
 
 
 def test_its_own_light_is_in_the_unit(gpu: Gpu) -> None:
     """What shines may be a part of a shape, and shines as the whole picture is bright."""
     glowing = Material(base_color=(0, 0, 0, 1), roughness=1, emissive=(3e6, 2e6, 1e6))
-    scene = Scene((), (), Camera((0, 0, 4), (0, 0, 0)), implicits=[Implicit(sphere(2).material(glowing))])
+    scene = Scene((), (), Camera((0, 0, 4), (0, 0, 0)), implicits=[Implicit((sphere(2) | box()).material(glowing))])
     assert unit_of(scene) >= 3e6
     found = traced(gpu, scene, size=(4, 3))
     np.testing.assert_allclose(found.radiance[1, 1], glowing.emissive, rtol=1e-5)
@@ -128,9 +134,7 @@ def test_its_own_light_is_in_the_unit(gpu: Gpu) -> None:
 def test_the_cache_knows_the_code_of_implicit_surfaces(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
     listed: list[Path] = []
     monkeypatch.setattr(module, "version_of", lambda sources: listed.extend(sources) or "version")
-    one, two = (
-        module._entry(Scene(implicits=[Implicit(sphere(r))]), (4, 3), ONCE, gpu) for r in (1.0, 1.0000001)
-    )
+    one, two = (module._entry(Scene(implicits=[Implicit(sphere(r))]), (4, 3), ONCE, gpu) for r in (1.0, 1.0000001))
     assert one != two
     names = {f"{path.parent.name}/{path.name}" for path in listed}
     assert {"sdf/march.wesl", "sdf/interpreter.wesl", "sdf/program.py", "sdf/field.py", "tracing/fields.wesl"} <= names
@@ -138,14 +142,33 @@ def test_the_cache_knows_the_code_of_implicit_surfaces(gpu: Gpu, monkeypatch: py
 
 
 def test_loops_that_are_ended_early_are_no_truth(gpu: Gpu) -> None:
-    """A shape of which nothing can be pruned: the march of a ray that passes it by closely takes too many turns for a
-    software adapter, which would say nothing.
+    """A software adapter would say nothing. All beads are in one cell of an object that is a thousand kilometres wide,
+    so that none is left out anywhere.
     """
     if gpu.adapter_info["adapter_type"] != "CPU":
         pytest.skip("a GPU takes its time")
-    rng = np.random.default_rng(1)
-    beads = [sphere(0.2).at(*place) for place in rng.uniform(-1, 1, (400, 3))]
-    scene = Scene(implicits=[Implicit(union(*beads, smooth=0.01, blend="root"))], lights=(SUN,))
-    scene = scene.with_(camera=Camera((0, 1, 4), (0, 0, 0), fov=0.3))
+    beads = [sphere(0.2).at(*place) for place in np.random.default_rng(1).uniform(-1, 1, (4000, 3))]
+    wide = union(*beads, box((1e6, 1.0, 1e6)).at(0, -1000, 0))
+    scene = Scene((), (SUN,), Camera((0, 1, 4), (0, 0, 0), fov=0.3), implicits=[Implicit(wide)])
     with pytest.raises(GpuError, match="march for longer"):
-        traced(gpu, scene, size=(8, 2))
+        traced(gpu, scene, size=(3, 2))
+
+
+def test_shadow_techniques_tend_to_it(gpu: Gpu) -> None:
+    """Off the rims, which a frame draws by a part of a pixel wider."""
+    thing = (sphere(0.5) | box((0.9, 0.3, 0.5)).at(0.5, -0.3, 0)).at(-0.2, 0.1, -3)
+    sun = DirectionalLight((0.4, -1, -0.3), 2.0, angular_diameter=0.2)
+    scene = Scene([props.floor(-0.6, 4, ROUGH)], [sun], props.AHEAD, implicits=[Implicit(thing, material=ROUGH)])
+    size = (40, 30)
+    found = traced(gpu, scene, TruthSettings(target=4e-3), size)
+    got = {
+        "rays": props.shoot(gpu, scene, size, shadow=RayTraced(samples=16, fresh=1), frames=4),
+        "hard": props.shoot(gpu, scene, size, shadow=ShadowMap(size=1024)),
+    }
+    seen = np.where(np.isfinite(found.depth), found.depth, 1e3)
+    alike = np.abs(got["rays"].depth - seen) < 2e-3 * seen
+    alike[1:-1, 1:-1] &= alike[:-2, 1:-1] & alike[2:, 1:-1] & alike[1:-1, :-2] & alike[1:-1, 2:]
+    assert alike.mean() > 0.25
+    off = {name: props.difference(shot.radiance[alike], found.radiance[alike]) for name, shot in got.items()}
+    assert off["rays"] < 0.02, off
+    assert off["rays"] < 0.5 * off["hard"] < 0.2, off

@@ -14,15 +14,16 @@ each other, the nearer one's material is taken whole.
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tyndall.gpu.params import ParameterError
 from tyndall.scene.model import Material, Solid
-from tyndall.sdf.shape import Combination, Floats, Modifier, Painted, Shape, Transformed
+from tyndall.sdf.repetition import Repetition
+from tyndall.sdf.shape import Combination, Floats, Modifier, Named, Painted, Shape, Transformed
 
 Numbers = NDArray[np.int64]
 _BORROWED = -1  # of a cut: the material of what is cut
@@ -42,6 +43,9 @@ def painted(shape: Shape, points: ArrayLike, default: Material) -> tuple[list[Ma
 
     Returns:
         Materials, the default first, and the number (N,) of each place's.
+
+    Raises:
+        ParameterError: materials differ below a kind of node that is not known here.
     """
     materials = [default, *materials_of(shape)]
     brush = _Brush({id(material): i for i, material in reversed(list(enumerate(materials)))})
@@ -70,8 +74,12 @@ class _Brush:
                 inverse = np.linalg.inv(shape.placement)
                 value, which = self.stroke(shape.shape, p @ inverse[:3, :3].T + inverse[:3, 3], inherited)
                 return shape.factor * value, which
+            case Repetition():
+                return self.stroke(Combination(shape.copies()), p, inherited)
+            case Named():
+                return self.stroke(shape.shape, p, inherited)
             case _:
-                return self._asked(shape, p, inherited)
+                raise ParameterError(f"shape: the materials in a {type(shape).__name__} are not known here")
 
     def _joined(self, shape: Combination, p: Floats, inherited: int) -> Numbers:
         cutting = shape.operation == "subtraction"
@@ -88,41 +96,6 @@ class _Brush:
             which = np.where(ahead & (mine != _BORROWED), mine, which) if cutting else np.where(ahead, mine, which)
             best = np.maximum(best, value)
         return which
-
-    def _asked(self, shape: Shape, p: Floats, inherited: int) -> tuple[Floats, Numbers]:
-        """Of a node with one child that asks it elsewhere, and perhaps more than once: the least answer's."""
-        spy = _Spy(shape.children[0], self, inherited)
-        value = dataclasses.replace(shape, shape=spy).distance(p)  # type: ignore[type-var]
-        best, which = np.full(len(p), np.inf), np.full(len(p), inherited)
-        for answer, mine in spy.answers:
-            if len(answer) == len(p):
-                which = np.where(answer < best, mine, which)
-                best = np.minimum(answer, best)
-        return value, which
-
-
-@dataclass(frozen=True, eq=False)
-class _Spy(Shape):
-    """A shape that remembers what it was asked."""
-
-    shape: Shape
-    brush: _Brush
-    inherited: int
-    answers: list[tuple[Floats, Numbers]] = field(default_factory=list)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "dimension", self.shape.dimension)
-
-    @property
-    def children(self) -> tuple[Shape, ...]:
-        return (self.shape,)
-
-    def distance(self, p: Floats) -> Floats:
-        self.answers.append(self.brush.stroke(self.shape, p, self.inherited))
-        return self.answers[-1][0]
-
-    def extent(self, level: float) -> tuple[Floats, Floats]:
-        return self.shape.extent(level)
 
 
 def _nodes(shape: Solid) -> Iterator[Solid]:

@@ -46,3 +46,11 @@ def test_places_are_those_in_moved_and_changed_parts() -> None:
     pair = union(sphere(1).material(RED), sphere(1).at(3).material(BLUE))
     shape = Named(Round(pair.rotate(np.pi / 2).scale(2).at(0, 0, 1), 0.25), "pair")
     assert colours(shape, (0, 2.25, 1), (0, 8.2, 1)) == [RED, BLUE]
+
+
+def test_copies_have_their_materials() -> None:
+    pair = union(sphere(0.3).material(RED), sphere(0.3).at(0, 1).material(BLUE))
+    assert colours(pair.repeat((2, 4, 4), (3, 1, 1)), (2.3, 0, 0), (-2, 1.3, 0), (0.3, 1, 0)) == [RED, BLUE, BLUE]
+    assert colours(pair.repeat((2, 4, 4)), (20.3, 0, 8), (-14, 1.3, 0)) == [RED, BLUE]
+    twisted = pair.twist(0.5)
+    assert colours(twisted, (0, 0, 0.3), (0, 0.7, 0)) == [RED, BLUE]

@@ -259,8 +259,7 @@ def compile_shape(shape: Shape, kinds: Kinds) -> Program:
     """The program of a solid shape.
 
     Raises:
-        ParameterError: a flat shape, one of more than a million nodes, or one that is repeated for ever inside
-            another such one.
+        ParameterError: a flat shape, or one of more than a million nodes.
     """
     return _Compiler(kinds).compile(shape)
 

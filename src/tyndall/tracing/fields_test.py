@@ -208,6 +208,25 @@ def test_rays_leave_whatever_the_numbers_are_like(gpu: Gpu, implicit: Implicit, 
     assert (found & (depth > hair) & ~hidden).sum() == 0, "leaks"
 
 
+def test_rays_along_a_surface_come_to_an_answer(gpu: Gpu) -> None:
+    """Steps are as long as the surface is near: a march's own steps would end a few metres on. What meets the floor at
+    a flat angle meets it where it does, what leaves it leaves, and a wall far along it is not missed.
+    """
+    ground = box((200.0, 2.0, 200.0)).at(0, -1, 0) | box((1.0, 3.0, 200.0)).at(20.5, 0, 0)
+    heights = np.array([1e-3, 0.3, 1.7, 0.01, 0.05, 1e-3, 1e-4])
+    slopes = np.array([-4e-3, -0.02, -0.1, 0, 0, 0, 1e-3])
+    meets = np.array([0.25, 15.0, 17.0, 20.0, 20.0, np.inf, np.inf])
+    ways = np.stack([np.ones(7), slopes, np.zeros(7)], axis=1)
+    ways[5:] = ways[5:, [2, 1, 0]]  # along the wall
+    origins = np.stack([np.zeros(7), heights, np.zeros(7)], axis=1)
+    with World(gpu, Scene(implicits=[Implicit(ground)])) as world:
+        hit = cast(gpu, world, origins, ways)["t"]
+        answers = blocked(gpu, world, origins, ways)
+    assert (hit < FAR).tolist() == np.isfinite(meets).tolist() == answers.tolist()
+    np.testing.assert_allclose(hit[:5], meets[:5], rtol=1e-2)
+    np.testing.assert_allclose(hit[1:5], meets[1:5], rtol=1e-3)
+
+
 def test_the_nearer_of_a_mesh_and_an_implicit_surface_is_hit(gpu: Gpu) -> None:
     red = Material(base_color=(0.8, 0.1, 0.2, 1), roughness=0.3, metallic=0.25, emissive=(1, 2, 3))
     blue = Material(base_color=(0.1, 0.2, 0.8, 1), roughness=0.7)

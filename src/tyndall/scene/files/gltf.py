@@ -54,6 +54,8 @@ EXTENSIONS = {
     "EXT_texture_webp",
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",
+    "KHR_materials_ior",
+    "KHR_materials_transmission",
     "KHR_materials_unlit",
     "KHR_mesh_quantization",
     "KHR_texture_transform",
@@ -298,7 +300,7 @@ class _Reader:
             "normal_texture": row.get("normalTexture"),
             "emissive_texture": row.get("emissiveTexture"),
         }
-        maps: dict[str, Texture | None] = {}
+        maps: dict[str, Any] = {}
         uv_set: int | None = None
         for name, info in infos.items():
             if info is None:
@@ -316,18 +318,19 @@ class _Reader:
         if mode == "BLEND":
             self._warn(row.where, "alphaMode BLEND is drawn as MASK")
         strength = row.object("extensions", "KHR_materials_emissive_strength").number("emissiveStrength", 1.0)
+        ior = row.object("extensions", "KHR_materials_ior").number("ior", 1.5)
         try:
             material = Material(
                 name=row.text("name"),
-                base_color=surface.numbers("baseColorFactor", (1.0, 1.0, 1.0, 1.0)),  # type: ignore[arg-type]
+                base_color=surface.numbers("baseColorFactor", (1.0, 1.0, 1.0, 1.0)),
                 metallic=surface.number("metallicFactor", 1.0),
                 roughness=surface.number("roughnessFactor", 1.0),
-                emissive=tuple(  # type: ignore[arg-type]
-                    strength * e for e in row.numbers("emissiveFactor", (0.0, 0.0, 0.0))
-                ),
+                emissive=tuple(strength * e for e in row.numbers("emissiveFactor", (0.0, 0.0, 0.0))),
                 alpha_mode="opaque" if mode == "OPAQUE" else "mask",
                 alpha_cutoff=row.number("alphaCutoff", 0.5),
                 double_sided=row.flag("doubleSided"),
+                transmission=row.object("extensions", "KHR_materials_transmission").number("transmissionFactor", 0.0),
+                ior=ior or 1.5,  # 0 asks for a mirror at every angle in older files
                 **maps,
             )
         except ParameterError as error:

@@ -284,7 +284,9 @@ def test_a_material_with_everything(doc: Document, tmp_path: Path) -> None:
         materials=[{
             "name": "all", "alphaMode": "MASK", "alphaCutoff": 0.25, "doubleSided": True,
             "emissiveFactor": [1, 0.5, 0], "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 8},
-                                                          "KHR_materials_unlit": {}},
+                                                          "KHR_materials_unlit": {},
+                                                          "KHR_materials_ior": {"ior": 1.25},
+                                                          "KHR_materials_transmission": {"transmissionFactor": 0.5}},
             "pbrMetallicRoughness": {
                 "baseColorFactor": [0.1, 0.2, 0.3, 0.4], "metallicFactor": 0.5, "roughnessFactor": 0.25,
                 "baseColorTexture": {"index": 0, "extensions": {"KHR_texture_transform": {
@@ -305,6 +307,7 @@ def test_a_material_with_everything(doc: Document, tmp_path: Path) -> None:
         True,
     )
     assert (material.base_color, material.metallic, material.roughness) == ((0.1, 0.2, 0.3, 0.4), 0.5, 0.25)
+    assert (material.transmission, material.ior) == (0.5, 1.25)
     assert material.emissive == (8, 4, 0)
     base, rough = material.base_color_texture, material.metallic_roughness_texture
     normal, glow = material.normal_texture, material.emissive_texture

@@ -26,7 +26,7 @@ from tyndall.gpu.params import ParameterError, fields_of
 from tyndall.scene.errors import SceneError
 from tyndall.scene.files.atomic import atomic_write
 from tyndall.scene.files.source import beside, map_bytes
-from tyndall.scene.model import Image, Implicit, Instance, Material, Mesh, Scene, Texture
+from tyndall.scene.model import Image, Implicit, Instance, Material, Mesh, Scene, Texture, Volume
 
 VERSION = 1
 # Who knows the JSON of implicit surfaces: a module with `pack`, `unpack` and `load_scene`, above this layer, that is
@@ -156,9 +156,16 @@ def save(scene: Scene, path: Path) -> None:
         **writer.tables,
         "instances": instances,
     }
-    if scene.implicits:
+    if scene.implicits or scene.volumes:
         try:
-            record["implicits"] = codec().pack(scene.implicits)
+            if scene.implicits:
+                record["implicits"] = codec().pack(scene.implicits)
+            if scene.volumes:
+                record["volumes"] = {
+                    "surfaces": codec().pack([volume.surface for volume in scene.volumes]),
+                    "media": [writer.parameters(volume.medium) for volume in scene.volumes],
+                    "edges": [volume.edge for volume in scene.volumes],
+                }
         except ParameterError as error:
             raise SceneError(path, str(error)) from error
     wrong: list[str] = []
@@ -228,12 +235,16 @@ def load(path: Path) -> Scene:
         return implicit
 
     wrong: list[str] = []
-    implicits: tuple[Implicit, ...] = ()
-    if data.get("implicits") is not None:
-        try:
-            implicits = codec().unpack(path, data["implicits"], raw.decode("utf-8"))
-        except SceneError as error:
-            wrong += error.mistakes
+    filled = data.get("volumes")
+    surfaces = filled.get("surfaces") if isinstance(filled, dict) else None
+    packed = {"implicits": data.get("implicits"), "volumes": surfaces}
+    objects: dict[str, tuple[Implicit, ...]] = {"implicits": (), "volumes": ()}
+    for key, described in packed.items():
+        if described is not None:
+            try:
+                objects[key] = codec().unpack(path, described, raw.decode("utf-8"))
+            except SceneError as error:
+                wrong += error.mistakes
     binary: NDArray[np.uint8] | None = None
     if isinstance(data.get("data"), str):
         try:
@@ -256,7 +267,24 @@ def load(path: Path) -> Scene:
         wrong += schema.mistakes(error, data)
     if wrong:
         raise SceneError(path, wrong)
-    return _build(path, record, np.zeros(0, np.uint8) if binary is None else binary).with_(implicits=implicits)
+    scene = _build(path, record, np.zeros(0, np.uint8) if binary is None else binary)
+    return scene.with_(implicits=objects["implicits"], volumes=_volumes(path, record.volumes, objects["volumes"]))
+
+
+def _volumes(path: Path, record: Any, surfaces: tuple[Implicit, ...]) -> list[Volume]:
+    if record is None:
+        return []
+    if not len(surfaces) == len(record.media) == len(record.edges):
+        raise SceneError(
+            path, f"volumes: {len(surfaces)} surfaces, {len(record.media)} media and {len(record.edges)} edges"
+        )
+    try:
+        return [
+            Volume(surface.shape, medium, surface.transform, edge, surface.name)
+            for surface, medium, edge in zip(surfaces, record.media, record.edges, strict=True)
+        ]
+    except ParameterError as error:
+        raise SceneError(path, f"volumes: {error}") from error
 
 
 def _not_finite(value: Any, loc: tuple[Any, ...]) -> list[tuple[str, float]]:

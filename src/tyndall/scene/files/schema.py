@@ -237,6 +237,14 @@ _TextureRecord: Any = record_of(Texture)
 _MaterialRecord: Any = record_of(Material)
 
 
+class VolumesRecord(Record):
+    """Media that fill the inside of shapes; the three lists are of one length."""
+
+    surfaces: dict[str, Any] = pydantic.Field(description="their shapes, as those of implicit surfaces")
+    media: tuple[parameters(Medium), ...] = ()  # type: ignore[valid-type]
+    edges: tuple[Annotated[float, pydantic.Field(ge=0, allow_inf_nan=False)], ...] = ()
+
+
 class SceneRecord(Record):
     """A Tyndall scene: lengths in metres, right-handed, +Y up, light linear with Rec.709 primaries."""
 
@@ -255,6 +263,7 @@ class SceneRecord(Record):
     meshes: tuple[MeshRecord, ...] = ()
     instances: tuple[InstanceRecord, ...] = ()
     implicits: dict[str, Any] | None = pydantic.Field(None, description="implicit surfaces; see docs/sdf-json.md")
+    volumes: VolumesRecord | None = pydantic.Field(None, description="media inside implicit surfaces")
 
 
 @cache

@@ -15,7 +15,7 @@ import tyndall
 from tyndall import sdf
 from tyndall.gpu.params import Field, ParameterError, fields_of
 from tyndall.scene.errors import SceneError
-from tyndall.scene.model import DirectionalLight, Implicit, Material, Scene
+from tyndall.scene.model import DirectionalLight, Implicit, Material, Medium, Scene, Volume
 from tyndall.sdf.files import load, save
 from tyndall.sdf.files.names import GROUP, OPERATIONS, node_classes
 from tyndall.sdf.files.places import parse, places
@@ -386,6 +386,23 @@ def test_a_scene_file_holds_implicit_surfaces(tmp_path: Path) -> None:
     for a, b in zip(again.implicits, implicits, strict=True):
         assert all(getattr(a, name) == getattr(b, name) for name in fields)
     assert "implicits" not in json.loads(write_plain(tmp_path).read_text())
+
+
+def test_a_scene_file_holds_volumes(tmp_path: Path) -> None:
+    matrix = np.diag([1, 2, 3, 1.0])
+    volumes = (
+        Volume(sdf.sphere(1) | sdf.box(1), Medium(0.5, (0.1, 0.2, 0.3)), matrix, 0.25, "cloud"),  # type: ignore[arg-type]
+        Volume(sdf.sphere(2), Medium(1.0)),
+    )
+    tyndall.save(Scene(volumes=volumes), tmp_path / "scene.json")
+    again = tyndall.load(tmp_path / "scene.json").volumes
+    for a, b in zip(again, volumes, strict=True):
+        assert all(getattr(a, name) == getattr(b, name) for name in ("shape", "medium", "transform", "edge", "name"))
+    document = json.loads((tmp_path / "scene.json").read_text())
+    document["volumes"]["edges"] = [0.5]
+    (tmp_path / "scene.json").write_text(json.dumps(document))
+    with pytest.raises(SceneError, match="volumes: 2 surfaces, 2 media and 1 edges"):
+        tyndall.load(tmp_path / "scene.json")
 
 
 def write_plain(folder: Path) -> Path:

@@ -107,10 +107,10 @@ def _trunk() -> Shape:
         egg((0, 0.6, 0), (0.53, 0.56, 0.48)).material(FUR),
         egg((0, 1.16, 0.03), (0.47, 0.42, 0.42)).material(FUR),
         ball((0, 0.46, -0.5), 0.16).material(CREAM),
-        egg((0, 0.56, 0.13), (0.4, 0.43, 0.385)).material(CREAM),
-        egg((0, 1.05, 0.36), (0.2, 0.14, 0.14)).material(CREAM),
         smooth=0.14,
     )
+    light = [egg((0, 0.57, 0.18), (0.35, 0.4, 0.345)), egg((0, 1.05, 0.36), (0.2, 0.14, 0.14))]
+    fur = union(fur, *(part.material(CREAM) for part in light), smooth=0.06)
     tuft = union(
         *(limb((x / 3, 1.53, 0.1), (x, 1.7 - abs(x), 0.12), 0.05, 0.018).material(FUR) for x in (-0.09, 0.0, 0.1)),
         smooth=0.03,
@@ -155,7 +155,7 @@ def creature() -> Shape:
     """The jumper at rest in the air: parts ``body``, ``left ear``, ``right ear``, ``left foot``, ``right foot``."""
     ears = [_ear(1 if at[0] > 0 else -1).at(*at).named(name) for name, at in EARS.items()]
     feet = [_foot(1 if at[0] > 0 else -1).at(*at).named(name) for name, at in FEET.items()]
-    return union(_trunk().named("body"), *ears, *feet, smooth=0.0)
+    return union(_trunk().named("body"), *ears, *feet)
 
 
 def _hop(time: float) -> tuple[Floats, dict[str, ArrayLike]]:
@@ -177,7 +177,9 @@ def _hop(time: float) -> tuple[Floats, dict[str, ArrayLike]]:
     place[:3, 3] = ROUND * math.sin(way), height + 0.03, ROUND * (math.cos(way) - 1)
     parts: dict[str, ArrayLike] = {"body": squash}
     for (name, at), side in zip(EARS.items(), (1, -1), strict=True):
-        parts[name] = squash @ about(at, spin(16 * speed, 0, side * (30 * speed - 22 * crouch)))
+        parts[name] = squash @ about(
+            at, spin(16 * speed, 0, side * (30 * max(speed, 0.0) + 9 * min(speed, 0.0) - 22 * crouch))
+        )
     for name, at in FEET.items():
         parts[name] = about(at, spin(34 * abs(speed)))
     return place @ turned, parts

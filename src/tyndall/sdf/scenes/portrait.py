@@ -69,21 +69,26 @@ def _skull() -> Shape:
     )
     nostrils = [egg((0.055 * side, -0.405, 1.02), (0.035, 0.03, 0.045)) for side in (-1, 1)]
     face = union(subtraction(head, *sockets, smooth=0.07), nose, smooth=0.09)
-    mouth = egg((0, -0.635, 0.9), (0.22, 0.025, 0.09))
+    mouth = egg((0, -0.63, 0.9), (0.2, 0.02, 0.09))
     return subtraction(face, *nostrils, mouth, smooth=0.03)
 
 
-def _lips() -> Shape:
+def laid(shape: Shape, points: Sequence[tuple[float, float]], lift: float = 0.0) -> Floats:
+    """(N, 3) places where a shape is met along −Z at x and y, by its own distances; a lift moves them along Z."""
+    places = np.array([(x, y, 2.0) for x, y in points])
+    for _ in range(48):
+        places[:, 2] -= shape(places)
+    return places + [0, 0, lift]
+
+
+def _lips(face: Shape) -> Shape:
     upper: list[Shape] = []
     for side in (-1, 1):
-        path = [(0.275, -0.585, 0.745), (0.13, -0.61, 0.855), (0.045, -0.585, 0.893), (0.0, -0.6, 0.893)]
-        upper += strand([(side * x, y, z) for x, y, z in path], (0.014, 0.037, 0.044, 0.034), 4)
-    lower = strand(
-        [(-0.265, -0.595, 0.75), (-0.12, -0.68, 0.85), (0, -0.705, 0.872), (0.12, -0.68, 0.85), (0.265, -0.595, 0.75)],
-        (0.012, 0.046, 0.058, 0.046, 0.012),
-        6,
-    )
-    return union(union(*upper, smooth=0.03), union(*lower, smooth=0.03)).material(LIPS)
+        path = laid(face, [(side * x, y) for x, y in ((0.27, -0.562), (0.15, -0.61), (0.05, -0.6), (0.0, -0.61))])
+        upper += strand(path + [0, 0, -0.005], (0.014, 0.034, 0.042, 0.036), 4)
+    below = laid(face, [(-0.25, -0.572), (-0.13, -0.675), (0, -0.7), (0.13, -0.675), (0.25, -0.572)], -0.005)
+    lower = strand(below, (0.012, 0.044, 0.054, 0.044, 0.012), 6)
+    return union(union(*upper, smooth=0.025), union(*lower, smooth=0.03)).material(LIPS)
 
 
 def _lid(edge: float, radius: float) -> Shape:
@@ -123,9 +128,9 @@ def _lashes(side: int) -> list[Shape]:
     return parts
 
 
-def _brow(side: int) -> Shape:
-    path = [(0.15, 0.34, 0.945), (0.3, 0.42, 0.915), (0.48, 0.42, 0.82), (0.65, 0.31, 0.665)]
-    return union(*strand([(side * x, y, z) for x, y, z in path], (0.045, 0.05, 0.04, 0.014), 5), smooth=0.02)
+def _brow(face: Shape, side: int) -> Shape:
+    path = laid(face, [(side * x, y) for x, y in ((0.15, 0.35), (0.3, 0.42), (0.48, 0.42), (0.64, 0.32))])
+    return union(*strand(path, (0.04, 0.045, 0.036, 0.014), 5), smooth=0.02)
 
 
 def _ear(side: int) -> Shape:
@@ -263,18 +268,16 @@ def head() -> Shape:
         lids.append(union(upper, union(*_lashes(side)).material(LASH)).named("lids").at(*place))
         under = intersection(sphere(EYE + 0.016), box((1.0, 1.0, 1.0)).at(0, -0.5, 0).transform(spin(30)))
         lids.append(under.at(*place).material(SKIN))
-    freckles = [
-        egg((side * x, y, z), (0.017, 0.015, 0.012))
-        for side in (-1, 1)
-        for x, y, z in ((0.25, -0.3, 0.872), (0.36, -0.36, 0.84), (0.31, -0.43, 0.845), (0.46, -0.33, 0.785))
-    ]
-    skin = union(_skull().material(SKIN), *lids, smooth=0.035)
+    face = _skull()
+    spots = [(0.25, -0.3), (0.36, -0.36), (0.31, -0.43), (0.46, -0.33), (0.2, -0.4), (0.42, -0.44)]
+    freckles = [egg(p, (0.017, 0.015, 0.008)) for p in laid(face, [(s * x, y) for s in (-1, 1) for x, y in spots])]
+    skin = union(face.material(SKIN), *lids, smooth=0.035)
     return union(
         skin,
         *eyes,
-        _lips(),
-        _brow(1).material(BROW),
-        _brow(-1).material(BROW),
+        _lips(face),
+        _brow(face, 1).material(BROW),
+        _brow(face, -1).material(BROW),
         _ear(1),
         _ear(-1),
         union(*freckles).material(FRECKLE),
@@ -338,9 +341,9 @@ def _scarf() -> Shape:
 
 
 def _backdrop() -> Shape:
-    disc = cylinder(3.1, 0.12).at(-0.5, 0.1, -6.9).material(DISC)
-    wall = box((26, 16, 0.3)).at(0, 0, -7.2).material(WALL)
-    ring = torus(3.45, 0.04).at(-0.5, 0.1, -7.0).material(GOLD)
+    disc = cylinder(3.45, 0.12).at(-0.55, 0.1, -8.7).material(DISC)
+    wall = box((30, 18, 0.3)).at(0, 0, -9.0).material(WALL)
+    ring = torus(3.85, 0.045).at(-0.55, 0.1, -8.8).material(GOLD)
     return union(disc, wall, ring)
 
 

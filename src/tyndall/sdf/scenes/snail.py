@@ -50,9 +50,8 @@ GLOW = tuple(
 )
 
 
-POSE = np.diag([1.0, 1.0, 1.0, 1.0])
+POSE = spin(12, 14, 10) @ np.diag([1.14, 1.14, 1.14, 1.0])
 POSE[:3, 3] = SHELL
-POSE = POSE @ spin(12, 14, 10) @ np.diag([1.14, 1.14, 1.14, 1.0])
 
 
 def whorl(turn: ArrayLike) -> tuple[Floats, Floats, Floats]:
@@ -141,7 +140,9 @@ EYES = {"left eye": (2.86, 1.6, -0.14), "right eye": (2.82, 1.6, 0.28)}
 
 def _stalk(side: int) -> Shape:
     top = np.array([0.28 + 0.2 * side, 1.06 - 0.1 * side, 0.24 * side])
-    stalk = strand([np.array([0, -0.1, 0]), 0.3 * top + [0, 0.08, 0], 0.7 * top + [-0.02, 0.03, 0], top], (0.13, 0.085, 0.085), 4)
+    stalk = strand(
+        [np.array([0, -0.1, 0]), 0.3 * top + [0, 0.08, 0], 0.7 * top + [-0.02, 0.03, 0], top], (0.13, 0.085, 0.085), 4
+    )
     knob = egg(top + [0.02, 0.05, 0], (0.155, 0.165, 0.155))
     pupil = ball(top + [0.07, 0.07, 0.06], 0.115)
     shine = ball(top + [0.1, 0.14, 0.15], 0.03)

@@ -29,23 +29,13 @@ VOLUME = 5.5  # m³, about, of what is that near
 WAVE = 0.16  # m, how far each moves
 HEIGHT = 1.45  # m, of the knot's middle above the floor
 COLORS = tuple(
-    paint(c, 0.28)
+    paint(c, 0.3)
     for c in (
-        "#24306e",
-        "#3c2f86",
-        "#6a2f93",
-        "#a0338c",
-        "#cf4471",
-        "#ea6a4f",
-        "#f39a44",
-        "#f7c95c",
-        "#f6e7b0",
-        "#9fd6c4",
-        "#3fa0a8",
-        "#256a94",
+        *("#1f5fa8", "#1f8fa8", "#2fae94", "#86c66a", "#f2cf4a", "#f4a23a"),
+        *("#ee7038", "#e2485a", "#c23a86", "#8a3fa8", "#5a4bb8", "#3a55b4"),
     )
 )
-FLOOR = paint("#39405a", 0.6)
+FLOOR = paint("#cfc8bb", 0.75)
 
 
 @dataclass(frozen=True)
@@ -126,7 +116,7 @@ def _swarm(count: int, seed: int) -> tuple[Shape, Floats]:
         color = COLORS[int(len(COLORS) * u[i] / (2 * math.pi) + shades[i]) % len(COLORS)]
         x, y, z = (float(v) for v in places[i])
         grains.append(_grain(float(kinds[i]), float(sizes[i])).named("swarm").at(x, y, z).material(color))
-    return union(*grains, smooth=0.55 * mean), places[order]
+    return union(*grains, smooth=0.8 * mean), places[order]
 
 
 def swarm(count: int = COUNT, lights: int = 1, seed: int = 0) -> Scene:
@@ -150,10 +140,10 @@ def swarm(count: int = COUNT, lights: int = 1, seed: int = 0) -> Scene:
             Implicit(drops, material=COLORS[0], name="drops"),
             Implicit(plane(), material=FLOOR, name="floor"),
         ),
-        lights=suns(options.lights, SUN, 8.0, (1.0, 0.93, 0.84), (35, 65), 200),
-        camera=Camera((1.4, 3.5, 4.9), (0.0, 1.12, 0.0), fov=math.radians(42), exposure=0.1),
-        background=(0.05, 0.06, 0.10),
-        ambient=(0.20, 0.23, 0.32),
+        lights=suns(options.lights, SUN, 6.5, (1.0, 0.93, 0.84), (35, 65), 200),
+        camera=Camera((1.5, 3.9, 4.7), (0.0, 1.05, 0.1), fov=math.radians(39), exposure=0.0),
+        background=(0.55, 0.56, 0.6),
+        ambient=(0.26, 0.30, 0.38),
         name="swarm",
         motion=Motion(places),
         room=((low[0], low[1], low[2]), (high[0], high[1], high[2])),

@@ -48,7 +48,7 @@ FIRE = paint("#ff9a3c", 0.9, glow=7.0)
 FEATHER = paint("#f7f5ee", 0.9)
 
 
-def block(low: tuple[float, float, float], high: tuple[float, float, float], round_edge: float = 0.0) -> Shape:
+def block(low: tuple[float, float, float], high: tuple[float, float, float]) -> Shape:
     """A box between two corners."""
     size = tuple(b - a for a, b in zip(low, high, strict=True))
     x, y, z = ((a + b) / 2 for a, b in zip(low, high, strict=True))
@@ -172,7 +172,7 @@ def _gable(z: float, front: bool) -> list[Shape]:
         block((-half, y, z - 0.35), (half, y + rise, z + 0.05)),
         box((2 * length, 4, 1))
         .rotate(SLOPE)
-        .at(-half / 2 - 2 * math.sin(SLOPE) * -1, y + rise / 2 - 2 * math.cos(SLOPE), z),
+        .at(-half / 2 + 2 * math.sin(SLOPE), y + rise / 2 - 2 * math.cos(SLOPE), z),
         box((2 * length, 4, 1))
         .rotate(-SLOPE)
         .at(half / 2 - 2 * math.sin(SLOPE), y + rise / 2 - 2 * math.cos(SLOPE), z),

@@ -70,7 +70,11 @@ class FieldShadows(Technique):
         meshes = [kind for kind in content if isinstance(kind, Meshes)] if view.scene.instances else []
         if view.fields is None or not content:
             return maps.render(view.part(maps), content)
-        cast = maps.render(view.part(maps) if meshes else view.part(ShadowMap(size=16), "empty"), meshes)
+        walked = maps.render(view.part(maps, "walked"), content) if view.maps_wanted else None
+        if meshes:
+            cast = maps.render(view.part(maps), meshes)
+        else:
+            cast = walked or maps.render(view.part(ShadowMap(size=16), "empty"), [])
         answers = mask_image(view)
         soft = [light.extent > 0 for light in view.scene.lights]
         known = {
@@ -83,7 +87,6 @@ class FieldShadows(Technique):
         bindings = {**view.fields.bindings, **cast.bindings, "field_params": view.params, "shadow_masks": told}
         march = view.compute("surfaces").bind(bindings, answers_out=answers.write()).overlay(cast.overlay)
         march.dispatch(*view.size, answers.size[2])
-        drawn = cast.maps
-        if view.maps_wanted and drawn is not None:
-            drawn = maps.render(view.part(maps, "walked"), content).maps
-        return Visibility(self.shader(), self.shader(), bindings, drawn, cast.overlay)
+        if walked:  # those who walk through maps find these, and the few other points of the air ask them as well
+            cast = walked
+        return Visibility(self.shader(), self.shader(), {**bindings, **cast.bindings}, cast.maps, cast.overlay)

@@ -23,6 +23,7 @@ from tyndall.scene.model import (
 )
 from tyndall.sdf import box, sphere
 from tyndall.techniques.shadow.field import FieldShadows
+from tyndall.techniques.shadow.shadow_map import ShadowMap
 from tyndall.techniques.volumetric.march import March
 
 SIZE = (96, 72)
@@ -251,6 +252,18 @@ def test_the_air_is_asked_too(gpu: Gpu) -> None:
     floor = on_floor((48, 36))
     assert (want[floor] < 0.95 * lit[floor]).sum() > 50
     assert props.difference(got[floor], want[floor]) < 0.05
+
+
+@pytest.mark.parametrize("beside", [False, True])
+def test_who_walks_through_maps_gets_those_of_everything(gpu: Gpu, beside: bool) -> None:
+    """The same light in the air as over plain shadow maps, with meshes that cast and without."""
+    shapes = [props.floor(0, 4), props.box((1.0, 0.2, 0.6), (1.6, 0.8, 1.2))] if beside else []
+    scene = Scene(shapes, [DirectionalLight((0.5, -1.0, -0.35), 3.0)], ABOVE, Medium(0.05), implicits=FIELD)
+    shots = [
+        props.shoot(gpu, scene, (32, 24), shadow=shadow, volumetric="polygonal").inscattered
+        for shadow in (FieldShadows(map_size=512), ShadowMap(size=512))
+    ]
+    np.testing.assert_allclose(shots[0], shots[1], rtol=1e-3, atol=1e-5)
 
 
 def test_without_implicit_surfaces_it_is_the_shadow_map(gpu: Gpu) -> None:

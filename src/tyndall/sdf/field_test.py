@@ -1,0 +1,258 @@
+"""Cells say what whole programs say, and those what the shapes say: at rest, after motion, and where nothing fits."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import props
+import pytest
+from numpy.typing import NDArray
+
+from tyndall.gpu.device import Gpu
+from tyndall.gpu.params import ParameterError
+from tyndall.lab import field_check
+from tyndall.scene.model import Implicit
+from tyndall.sdf import Shape, box, intersection, sphere, subtraction, torus, union
+from tyndall.sdf.field import Field
+from tyndall.sdf.marching import Marching
+from tyndall.sdf.shape import Blend, rotation
+
+# Objects are long and thin: their cells are few, and as small beside their parts as those of a thick one.
+BLENDS: tuple[Blend, ...] = ("polynomial", "exponential", "root")
+
+
+def leaf(rng: np.random.Generator) -> Shape:
+    kind = rng.integers(3)
+    size = rng.uniform(0.15, 0.3)
+    made: Shape = sphere(size) if kind == 0 else box((size, 1.2 * size, 1.5 * size)) if kind == 1 else torus(size, 0.06)
+    turned = made.rotate(rng.uniform(0, 6), rng.normal(size=3).tolist()) if rng.random() < 0.5 else made
+    x, y, z = rng.uniform((-2, -0.3, -0.3), (2, 0.3, 0.3))
+    return turned.at(x, y, z)
+
+
+def tree(rng: np.random.Generator, leaves: int, depth: int = 0) -> Shape:
+    """Any operation above any other, hard or with any blend; more unions than others, so that something is left."""
+    if leaves == 1:
+        return leaf(rng)
+    left = int(rng.integers(1, leaves))
+    a, b = tree(rng, left, depth + 1), tree(rng, leaves - left, depth + 1)
+    smooth, blend = float(rng.choice((0.0, 0.08))), BLENDS[rng.integers(3)]
+    chosen = 0 if depth < 2 else rng.integers(6)
+    if chosen < 4:
+        return union(a, b, smooth=smooth, blend=blend)
+    if chosen == 4:
+        return subtraction(a, b, smooth=smooth, blend=blend)
+    return intersection(union(a, b), box((1.5, 1, 1)).at(*rng.uniform((-1, -0.2, -0.2), (1, 0.2, 0.2))), smooth=smooth)
+
+
+def shapes() -> dict[str, Shape]:
+    rng = np.random.default_rng(7)
+    bead = sphere(0.12).at(0.1).named("bead") | box(0.14).at(-0.1)
+    wave = sphere(0.3).at(0.3).repeat((0.9, 0, 0)) & box((2.7, 0.6, 0.6))
+    return {
+        "nest": tree(rng, 32),
+        **{blend: union(*(leaf(rng) for _ in range(16)), smooth=0.1, blend=blend) for blend in BLENDS},
+        "balls": union(
+            *(sphere(0.06).at(*rng.uniform((-2, -0.4, -0.4), (2, 0.4, 0.4))).named("ball") for _ in range(300))
+        ),
+        "copies": bead.repeat((0.7, 0.5, 0), (5, 2, 1)),
+        "forever": union(wave, sphere(0.2).at(0, 0.4), torus(0.3, 0.1).at(1), box(0.2).at(-1, 0.3)),
+    }
+
+
+SHAPES = shapes()
+NAMES = list(SHAPES)
+IMPLICITS = [Implicit(shape) for shape in SHAPES.values()]
+
+
+@pytest.fixture(scope="module")
+def field(gpu: Gpu) -> Iterator[Field]:
+    with Field(gpu, IMPLICITS) as made:
+        yield made
+
+
+def places(shape: Shape, count: int, seed: int = 0) -> NDArray[np.float32]:
+    low, high = shape.box
+    return np.random.default_rng(seed).uniform(low, high, (count, 3)).astype(np.float32)
+
+
+def agree(gpu: Gpu, field: Field, index: int, shape: Shape, count: int = 4000, *, oracle: int = 4000) -> float:
+    """What was asked of cells, programs and numpy is one; the part of the places whose cells have programs."""
+    points = places(shape, count)
+    whole, cell, has = field_check.values(gpu, field, index, points).astype(float)[:, :3].T
+    np.testing.assert_allclose(whole[:oracle], shape(points[:oracle]), atol=2e-5)
+    near = has > 0
+    np.testing.assert_allclose(cell[near], whole[near], atol=1e-5)
+    assert (np.abs(cell[~near]) <= np.abs(whole[~near]) + 1e-5).all()
+    assert (cell[~near] * whole[~near] >= 0).all()
+    return float(near.mean())
+
+
+# --- at rest ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_cells_say_what_the_shape_says(gpu: Gpu, field: Field, name: str) -> None:
+    near = agree(gpu, field, NAMES.index(name), SHAPES[name])
+    assert 0.02 < near < 0.98
+
+
+def test_a_million_places(gpu: Gpu, field: Field) -> None:
+    """A program of sixty nodes and more, by all its cells and as a whole."""
+    assert SHAPES["nest"].count > 60
+    agree(gpu, field, NAMES.index("nest"), SHAPES["nest"], 1_000_000, oracle=20_000)
+
+
+def test_lists_are_short(gpu: Gpu, field: Field) -> None:
+    """Of 300 balls a cell near the surface keeps a few: less than four a cell, all lists together."""
+    field.update()
+    used, overflows = field.counters()[NAMES.index("balls")]
+    assert 0 < used < 4 * 64**3 / 4
+    assert overflows == 0
+
+
+# --- where nothing fits -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("constants", "overflows"),
+    [
+        ({"_LEAST_ENTRIES": 64, "_MOST_ENTRIES": 64}, True),
+        ({"_LEAST_ENTRIES": 3000, "_MOST_ENTRIES": 3000}, True),
+        ({"_MOST_MARKS": 64}, True),
+        ({"_LONG": 20}, False),
+        ({"_LONG": 20, "_LEAST_ENTRIES": 3000, "_MOST_ENTRIES": 3000}, True),
+    ],
+    ids=["no-lists", "few-lists", "no-marks", "long", "long-few-lists"],
+)
+def test_other_ways_say_the_same(
+    gpu: Gpu, monkeypatch: pytest.MonkeyPatch, constants: dict[str, int], overflows: bool
+) -> None:
+    """Lists or marks that do not fit make cells slower, not wrong; nor does sorting out leaves first."""
+    for name, value in constants.items():
+        monkeypatch.setattr(f"tyndall.sdf.field.{name}", value)
+    with Field(gpu, IMPLICITS) as field:
+        for index, name in enumerate(NAMES):
+            agree(gpu, field, index, SHAPES[name], 1500, oracle=300)
+        assert (field.counters()[:, 1] > 0).any() == overflows
+
+
+def test_without_cells(gpu: Gpu) -> None:
+    with Field(gpu, IMPLICITS, pruning=False) as field:
+        for index, name in enumerate(NAMES):
+            assert agree(gpu, field, index, SHAPES[name], 1000) == 1
+
+
+# --- motion -------------------------------------------------------------------------------------------------------
+
+
+def moved(shape: Shape, name: str, given: NDArray[np.float64]) -> Shape:
+    matrices = np.tile(np.eye(4), (len(given), 1, 1))
+    if given.ndim == 2:
+        matrices[:, :3, 3] = given
+    else:
+        matrices = given
+    return shape.moved({name: iter(matrices)})
+
+
+def turns(count: int, rng: np.random.Generator) -> NDArray[np.float64]:
+    made = np.stack([rotation(angle, rng.normal(size=3).tolist()) for angle in rng.uniform(-1, 1, count)])
+    made[:, :3, 3] = rng.uniform(-0.1, 0.1, (count, 3))
+    return made
+
+
+@pytest.mark.parametrize(("name", "part", "count"), [("balls", "ball", 300), ("copies", "bead", 1)])
+@pytest.mark.parametrize("turned", [False, True])
+def test_moved_parts_are_where_they_were_moved(
+    gpu: Gpu, field: Field, name: str, part: str, count: int, turned: bool
+) -> None:
+    """Also those outside of the object's old box; copies of a part move together."""
+    rng = np.random.default_rng(3)
+    for given in (turns(count, rng) if turned else rng.normal(0, 0.2, (count, 3)), np.zeros((count, 3))):
+        field.move(part, given)
+        agree(gpu, field, NAMES.index(name), moved(SHAPES[name], part, given))
+
+
+def test_an_edited_part(gpu: Gpu, field: Field) -> None:
+    was = field.uploaded
+    field.edit("bead", radius=0.2)
+    assert field.uploaded - was < 2000
+    bead = sphere(0.2).at(0.1) | box(0.14).at(-0.1)
+    agree(gpu, field, NAMES.index("copies"), bead.repeat((0.7, 0.5, 0), (5, 2, 1)))
+    field.edit("bead", radius=0.12)
+    agree(gpu, field, NAMES.index("copies"), SHAPES["copies"])
+
+
+def test_an_edit_prunes_its_object_alone(gpu: Gpu, field: Field) -> None:
+    """Pruning counts anew, so what was written into the others' counters is still there."""
+    field.update()
+    before = gpu.read_buffer(field._counter_buffer).view(np.uint32).copy()
+    marked = np.full_like(before, 12345)
+    gpu.write(field._counter_buffer, marked)
+    field.edit("bead", radius=0.12)
+    field.update()
+    after = gpu.read_buffer(field._counter_buffer).view(np.uint32).reshape(len(NAMES), -1)
+    index = NAMES.index("copies")
+    assert (np.delete(after, index, axis=0) == 12345).all()
+    assert after[index, 0] == before.reshape(len(NAMES), -1)[index, 0]
+
+
+def test_an_object_is_placed_by_one_short_write(gpu: Gpu, field: Field) -> None:
+    """Its cells are in its own space: nothing is pruned, and it is the same there."""
+    field.update()
+    was = field.uploaded
+    transform = rotation(1.0, (1, 2, 3))
+    transform[:3, 3] = (4, 5, 6)
+    index = NAMES.index("balls")
+    field.place(index, transform)
+    assert 0 < field.uploaded - was <= 256
+    assert not any(made.dirty for made in field._objects)
+    agree(gpu, field, index, SHAPES["balls"], 1000)
+    field.place(index, np.eye(4))
+
+
+def test_what_cannot_be_moved(gpu: Gpu, field: Field) -> None:
+    with pytest.raises(ParameterError, match="no part 'bal'.*ball"):
+        field.move("bal", np.zeros((1, 3)))
+    with pytest.raises(ParameterError, match="300"):
+        field.move("ball", np.zeros((2, 3)))
+    with pytest.raises(ParameterError, match="not finite"):
+        field.move("ball", np.full((300, 3), np.nan))
+    with pytest.raises(ParameterError, match="no inverse"):
+        field.move("ball", np.zeros((300, 4, 4)))
+    with pytest.raises(ParameterError, match="has no width"):
+        field.edit("bead", width=1)
+
+
+# --- rays ---------------------------------------------------------------------------------------------------------
+
+RAYS = """
+    import package::sdf::march::{march_closest, march_occluded};
+    fn evaluate(x: vec4f) -> vec4f {
+        let direction = normalize(vec3f(1.0, -x.y, 0.0));
+        let hit = march_closest(vec3f(-9.0, x.x, 0.0), direction, 0.0, 100.0, 0.0);
+        let dark = march_occluded(vec3f(-9.0, x.x, 0.0), direction, 0.0, 100.0);
+        return vec4f(hit.t, f32(hit.steps), f32(dark), 0.0);
+    }
+"""
+
+
+@pytest.mark.parametrize("steps", [64, 4096])
+def test_rays_along_a_surface_end(gpu: Gpu, steps: int) -> None:
+    """Where they meet it, or beyond it; and with no more steps than they may take."""
+    slab = Implicit(box((20, 0.2, 20)).at(0, -0.1))
+    heights = np.array([0.5, 1e-2, 1e-3, 1e-4, 0.5, 0.1, 0.01, 1e-3], np.float32)
+    slopes = np.array([0, 0, 0, 0, 0.1, 0.02, 1e-3, 2e-4], np.float32)
+    rows = np.stack([heights, slopes, 0 * heights, 0 * heights], axis=1)
+    with Field(gpu, [slab], marching=Marching(steps=steps)) as field:
+        field.update()
+        t, used, dark, _ = props.evaluate(gpu, f"test_grazing_{steps}", RAYS, rows, scope=field.bindings).T
+    sure, flat = slopes >= 0.02, slopes == 0
+    ends = heights / np.maximum(slopes, 1e-9) * np.hypot(1, slopes)
+    np.testing.assert_allclose(t[sure], ends[sure], rtol=2e-2)
+    assert (t[flat] > 1e3).all()
+    assert ((np.abs(t / ends - 1) < 2e-2) | (t > 1e3)).all(), "flatter ones meet it where it is, or pass"
+    assert dark[sure].all()
+    assert not dark[flat].any()
+    assert (used <= steps + 160).all()
