@@ -22,11 +22,12 @@ Behind a straight edge the answer is within 0.065 of the light's share, and with
 left; its mean over the penumbra is right to 0.012. Where several edges cut the light it is that of seven smaller cones
 with an edge each. A rectangle is taken for a disk of the same area.
 
-With ``cones=1`` there is only the first ray, for lights of any size: what it leaves open is the part beside one straight
-edge, at the room outside of what hides the light, or at the depth that the ray goes in. Of what is thinner than the
-light's cone is wide only the half of the penumbra outside of the hard shadow is seen. It looks no closer than a part of a pixel's
-width at the receiver: it starts a quarter of one above the surface and meets what is nearer than an eighth of one. Its steps are longer than the usual ones, and cells far from all surfaces cost it nothing but a
-look; see ``field_one.wesl``.
+With ``cones=1`` there is only the first ray, for lights of any size: what it leaves open is the part beside one
+straight edge, at the room outside of what hides the light, or at the depth that the ray goes in. Of what is thinner
+than the light's cone is wide only the half of the penumbra outside of the hard shadow is seen. It looks no closer than
+a part of a pixel's width at the receiver: it starts a quarter of one above the surface, two away, and meets what is
+nearer than an eighth of one. Its steps are longer than the usual ones, and cells far from all surfaces cost it nothing
+but a look; see ``field_one.wesl``.
 
 Meshes receive these shadows as well. What they cast comes from a shadow map
 (:class:`~tyndall.techniques.shadow.shadow_map.ShadowMap`) of the meshes alone, which is multiplied in; without
