@@ -184,9 +184,10 @@ def _as_type(tp: Any, value: Any) -> Any:
                 errors.append(error)
         raise errors[0]
     if origin is Literal:
-        if value not in get_args(tp):
-            raise ValueError(value)
-        return value
+        for choice in get_args(tp):
+            if str(choice) == str(value):
+                return choice
+        raise ValueError(value)
     if origin is tuple:
         args = get_args(tp)
         items = value.split("," if "," in value else "x") if isinstance(value, str) else list(value)

@@ -46,7 +46,7 @@ from tyndall.lab import s5
 from tyndall.lab.busy import Busy
 from tyndall.lab.field_check import agreement
 from tyndall.lab.fingerprint import scene_hash, versions
-from tyndall.lab.first_picture import Order, in_a_process, run
+from tyndall.lab.first_picture import Order, in_a_process, run, techniques_of
 from tyndall.lab.measure import Times, measure
 from tyndall.lab.picture import check_folder, write_texts
 from tyndall.lab.scenes import open_scene
@@ -64,6 +64,8 @@ FRAME: Mapping[str, str] = {
     "antialiasing": "none",
     "tonemap": "aces",
 }
+# As the plain loop does it: one ray to each light, values along the normal.
+CHANGES: Mapping[str, Mapping[str, Any]] = {"field": {"cones": 1}, "field_ao": {"cones": 1}}
 BATCH = 8  # frames between two waits, where frames per second are counted
 STEP = 1 / 60  # s of a scene's own time from frame to frame
 _MOST_LITERAL = 2000  # primitives; a compiler has no end with more
@@ -252,7 +254,7 @@ class _Run:
                 "size": list(settings.size),
                 "seconds": settings.seconds,
                 "loop_seconds": settings.loop_seconds,
-                "frame": dict(FRAME),
+                "frame": {family: _told(name) for family, name in FRAME.items()},
             },
             "scenes": [],
         }
@@ -324,7 +326,7 @@ class _Run:
             scene = self._scene(name)
             row.update(facts(scene))
             figures: Row = {}
-            with Renderer(scene, self._s.size, gpu=self._gpu, **FRAME) as renderer:  # type: ignore[arg-type]
+            with Renderer(scene, self._s.size, gpu=self._gpu, **techniques_of(scene, FRAME, CHANGES)) as renderer:
                 figures["still"] = self._measured(renderer, renderer)
                 figures["memory"] = renderer.memory()
                 figures["uploaded_still"] = renderer.uploaded
@@ -392,7 +394,7 @@ class _Run:
         scene = scene.with_(implicits=implicits)
         motion = scene.motion
         rows: dict[str, Row] = {}
-        with Renderer(scene, s.size, gpu=self._gpu, **FRAME) as renderer:  # type: ignore[arg-type]
+        with Renderer(scene, s.size, gpu=self._gpu, **techniques_of(scene, FRAME, CHANGES)) as renderer:
             renderer.draw()
             self._gpu.wait()
             turns = [np.eye(4) for _ in range(s.edits)]
@@ -435,7 +437,9 @@ class _Run:
         rows = self.document.setdefault("first", [])
         for name in self._s.first:
             self._step(f"first picture of {name}")
-            order = Order(name, size=self._s.size, adapter=self.document["adapter"], techniques=dict(FRAME))
+            order = Order(
+                name, size=self._s.size, adapter=self.document["adapter"], techniques=dict(FRAME), changes=CHANGES
+            )
             scene = self._tried(name, partial(self._scene, name))
             if scene is None:
                 continue
@@ -492,6 +496,11 @@ class _Run:
         if self._out is not None:
             text = json.dumps(self.document, indent=1, ensure_ascii=False) + "\n"
             write_texts(self._out, {f"{NAME}.json": text})
+
+
+def _told(name: str) -> str:
+    """A technique's name and what is changed of it."""
+    return " ".join([name, *(f"{key}={value}" for key, value in CHANGES.get(name, {}).items())])
 
 
 def _move_all(renderer: Renderer, moves: Mapping[str, Any]) -> None:

@@ -28,6 +28,7 @@ from tyndall.lab.busy import Busy  # noqa: E402
 from tyndall.lab.measure import Times, measure  # noqa: E402
 from tyndall.lab.scenes import open_scene  # noqa: E402
 from tyndall.scene.model import Scene  # noqa: E402
+from tyndall.techniques import FAMILIES  # noqa: E402
 
 SLOW_MS = 1500.0  # a frame of the plain loop that would take longer is measured smaller
 _SMALLER = 4  # as wide and high
@@ -42,6 +43,7 @@ class Order:
         loops: whether unions of very many leaves are lists that the plain loop runs over; otherwise all is code.
         seconds: of measuring frames; 0: the first picture alone.
         techniques: of our frame, by family.
+        changes: their parameters, by technique.
     """
 
     scene: str
@@ -52,6 +54,14 @@ class Order:
     frames: int = 100_000
     adapter: str | None = None
     techniques: Mapping[str, str] | None = None
+    changes: Mapping[str, Mapping[str, Any]] | None = None
+
+
+def techniques_of(
+    scene: Scene, techniques: Mapping[str, str], changes: Mapping[str, Mapping[str, Any]]
+) -> dict[str, Any]:
+    """The techniques of a frame by family, as :class:`~tyndall.frame.Renderer` takes them."""
+    return {family: FAMILIES[family].make(name, scene.looks, changes.get(name)) for family, name in techniques.items()}
 
 
 def run(order: Order, gpu: Gpu | None = None, scene: Scene | None = None) -> dict[str, Any]:
@@ -92,7 +102,7 @@ def run(order: Order, gpu: Gpu | None = None, scene: Scene | None = None) -> dic
 
 def _make(order: Order, gpu: Gpu, scene: Scene, size: tuple[int, int], settings: Loop | None = None) -> Any:
     if order.who == "ours":
-        chosen: dict[str, Any] = dict(order.techniques or {})
+        chosen = techniques_of(scene, order.techniques or {}, order.changes or {})
         return Renderer(scene, size, gpu=gpu, **chosen)
     stage: Any = order.who
     return Baseline(gpu, scene, size, stage=stage, moving=order.loops, settings=settings)

@@ -15,13 +15,24 @@ deep it goes in says how much of the cone is hidden besides, and a wall is taken
 was met. Where a floor meets two walls, a quarter is open, and seven cones say up to 0.33; below a ball that all but
 rests on the floor they say 0.15 less than the form factor.
 
+``cones=1`` is the cheapest form, five values along the normal, with weights that follow from the corner instead of
+taste. There the value at ``h`` above the floor is ``min(h, x)``, and the closed form is ``1/2 + ∫ 2/π·√(1 − t²) dt``
+from 0 to ``k``. So with ``r`` the value as a part of ``h``, 1/2 and the integral of ``r`` over ``h/radius = sin φ``
+with the weight ``2/π·sin² φ`` dφ is exactly that; the taps are the middles of equal parts of φ, and each has its part's
+integral as its weight: five of them are within 0.004, three within 0.01, and an open plane is exactly open. Values go
+down to ``−h``, so that what is closed above is dark. Balls beside and above the floor say (by least squares against
+their form factors) that half of what a tap finds stays hidden for those that are farther; they are still missed by 0.19
+(rms, from 0.1 below to 0.4 for what hangs overhead or is much smaller than the radius). The taps are at 4/3 of the
+distances that they stand for, which changes nothing in the corner, and most of them above open ground are then known to
+be open from the cells alone.
+
 Meshes receive it, but only implicit surfaces occlude.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 from tyndall.gpu.params import param
 from tyndall.scene.model import Scene
@@ -30,7 +41,7 @@ from tyndall.techniques.contract import Occlusion, Technique, Unsupported, View
 
 @dataclass(frozen=True)
 class FieldAo(Technique):
-    """Seven cones through the distance field."""
+    """Seven cones through the distance field, or values along the normal."""
 
     name: ClassVar[str] = "field_ao"
     paper: ClassVar[str] = "Evans 2006, Fast approximations for global illumination on dynamic scenes; Quilez"
@@ -39,7 +50,11 @@ class FieldAo(Technique):
     )
 
     radius: float = param(1.0, 1e-6, None, "distance within which surfaces block the ambient light", unit="m")
-    steps: int = param(16, 1, 256, "most samples of the field along a cone")
+    cones: Literal[1, 7] = param(
+        7, doc="7: as near the truth as they get; 1: a few values along the normal", rebuild=True
+    )
+    steps: int = param(16, 1, 256, "most samples of the field along each of seven cones")
+    taps: int = param(5, 1, 8, "values along the normal in place of cones")
     strength: float = param(1.0, 0, 1, "part of the darkening that is applied; 1 is what a grey sky gives")
 
     def supports(self, scene: Scene) -> None:
@@ -53,5 +68,6 @@ class FieldAo(Technique):
         """Gather what is open above each pixel's surface."""
         assert view.fields is not None, "supports() saw implicit surfaces"
         image = view.texture("open", view.size, "r32float")
-        view.compute("gather").bind(view.fields.bindings, ambient_out=image.write()).dispatch(*view.size)
+        told = view.keep("told", (image, self.cones), lambda: image.write().declaring(AO_TAPS=self.cones == 1))
+        view.compute("gather").bind(view.fields.bindings, ambient_out=told).dispatch(*view.size)
         return Occlusion(self.shader(), {"ambient_image": image.sampled()})

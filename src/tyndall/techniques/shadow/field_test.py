@@ -153,6 +153,43 @@ def test_soft_shadows_of_all_kinds_of_light_are_near_the_truth(gpu: Gpu, light: 
     assert np.abs(got[sure] - truth).mean() < min(4e-3, np.abs(pcss[sure] - truth).mean())
 
 
+@pytest.mark.parametrize("light", LIGHTS)
+def test_one_ray_is_as_hard_as_many(gpu: Gpu, light: Light) -> None:
+    """But for pixels at the edge, which a part of their width may move."""
+    scene = Scene([props.floor(0, 4)], [light], ABOVE, implicits=FIELD)
+    off = np.abs(received(gpu, scene, cones=1) - received(gpu, scene))[on_floor()]
+    assert (off > 0.01).mean() < 0.005
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.4])
+def test_one_ray_tells_a_thick_straight_edge(gpu: Gpu, turn: float) -> None:
+    """On both sides of it. Of a thin sheet's penumbra only the lighter half, and darkness behind."""
+    camera = Camera((0, 0, -1.2), (0, 0, -3), fov=0.4, near=0.02)
+    light = DirectionalLight((0, 0, -1), 1.0, angular_diameter=0.2)
+    for thickness in (2.0, 0.01):
+        sheet = box((8, 16, thickness)).at(-4, 0, -1 + 0.5 * thickness).rotate(turn)
+        fields = props.fields(Implicit(sheet), specks=BEHIND)
+        got = received(gpu, Scene([props.wall(-3, 4)], [light], camera, implicits=fields), cones=1)
+        seen = props.rays(camera, SIZE)
+        points = seen.at((-3 - seen.origin[2]) / seen.directions[..., 2])
+        across = points[..., 0] * math.cos(turn) + points[..., 1] * math.sin(turn)
+        edge = np.where(across < 0, 2.0, 2.0 + thickness)
+        want = props.disk_part(across / (edge * math.tan(0.1)))
+        off = got - want
+        sure = across > -0.2 if thickness > 1 else across > 0.01
+        assert np.abs(off[sure]).max() < 0.1
+        assert got[across < -0.22].max() < 0.01
+
+
+@pytest.mark.parametrize("light", BIG)
+def test_one_ray_is_not_far_from_the_truth(gpu: Gpu, light: Light) -> None:
+    got = received(gpu, Scene([props.floor(0, 4)], [light], ABOVE, implicits=FIELD), cones=1)[::2, ::2]
+    points = floor_points(ABOVE)[::2, ::2]
+    sure = (np.abs(points[..., [0, 2]]).max(-1) < 3.5) & on_floor()[::2, ::2]
+    truth = seen_parts(light, points[sure])
+    assert np.abs(got[sure] - truth).mean() < 0.02
+
+
 def test_what_is_smaller_than_the_light_hides_its_part_of_it(gpu: Gpu) -> None:
     """Of a ball in the middle of the light, the part of the disk that it covers, and no dark ring around that."""
     light = DirectionalLight((0, 0, -1), 1.0, angular_diameter=0.4)
@@ -186,10 +223,20 @@ def test_the_terminator_fades_over_the_whole_light(gpu: Gpu) -> None:
         light = DirectionalLight((math.cos(elevation), -math.sin(elevation), 0), 3.0, angular_diameter=0.3)
         base = []
         far = props.fields(Implicit(sphere(0.1).at(0, 50, 0)))
-        for shadow, implicits in (("ray_traced", ()), (FieldShadows(), far)):
+        for shadow, implicits in (("ray_traced", ()), (FieldShadows(), far), (FieldShadows(cones=1), far)):
             scene = Scene([props.floor(0, 40)], [light], ABOVE, implicits=implicits)
             base.append(props.shoot(gpu, scene, (32, 24), shadow=shadow).base[..., 0])
-        np.testing.assert_allclose(base[1], base[0], rtol=0.02, atol=1e-3)
+        for one in base[1:]:
+            np.testing.assert_allclose(one, base[0], rtol=0.02, atol=1e-3)
+
+
+@pytest.mark.parametrize("elevation", [1.2, 0.3, 0.06])
+def test_an_open_plane_shades_itself_by_one_ray_no_more_than_by_many(gpu: Gpu, elevation: float) -> None:
+    own = props.fields(Implicit(box((40, 2, 40)).at(0, -1, 0)))
+    for size in (0.0, 0.02):
+        light = DirectionalLight((math.cos(elevation), -math.sin(elevation), 0), 3.0, angular_diameter=size)
+        got = received(gpu, Scene([], [light], ABOVE, implicits=own), cones=1)
+        assert got.min() > 0.98
 
 
 def test_the_air_is_asked_too(gpu: Gpu) -> None:
