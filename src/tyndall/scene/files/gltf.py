@@ -325,7 +325,9 @@ class _Reader:
                 base_color=surface.numbers("baseColorFactor", (1.0, 1.0, 1.0, 1.0)),  # type: ignore[arg-type]
                 metallic=surface.number("metallicFactor", 1.0),
                 roughness=surface.number("roughnessFactor", 1.0),
-                emissive=tuple(strength * e for e in row.numbers("emissiveFactor", (0.0, 0.0, 0.0))),  # type: ignore[arg-type]
+                emissive=tuple(  # type: ignore[arg-type]
+                    strength * e for e in row.numbers("emissiveFactor", (0.0, 0.0, 0.0))
+                ),
                 alpha_mode="opaque" if mode == "OPAQUE" else "mask",
                 alpha_cutoff=row.number("alphaCutoff", 0.5),
                 double_sided=row.flag("doubleSided"),
