@@ -302,6 +302,8 @@ class Renderer(Closing):
             self.gpu.discard()  # half a frame must not precede the next one
             for view in self._views.values():
                 view.forget()
+            for field in [*([self._fields.field] if self._fields else []), *(filled.field for filled in self._volumes)]:
+                field.forget()
             raise
         self.gpu.submit()
         self._frame += 1
