@@ -54,7 +54,7 @@ Operation = Literal["union", "intersection", "subtraction"]
 Blend = Literal["polynomial", "exponential", "root"]
 
 NUMBERS = 8  # of a primitive or modifier, as S5 has it
-MOST_DEEP = 160  # nodes within nodes: what walks an expression calls itself, some times a node
+MOST_DEEP = 240  # nodes within nodes: what walks an expression calls itself, some times a node
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
 
