@@ -71,7 +71,8 @@ def variants(family: str) -> list[tuple[str, dict[str, object]]]:
     """Each technique with its defaults, and once for each value of each text parameter."""
     found = []
     for name, cls in FAMILIES[family].members.items():
-        base: dict[str, object] = dict(SMALL.get(name, {}))
+        sides = {f.name: 64 for f in fields_of(cls) if family == "shadow" and f.name in ("size", "map_size")}
+        base: dict[str, object] = {**sides, **SMALL.get(name, {})}
         found.append((name, base))
         for f in fields_of(cls):
             choices = getattr(f.type, "__args__", ()) if isinstance(f.default, str) else ()
