@@ -154,3 +154,13 @@ def test_every_technique_declares_all_of_itself(cls: type) -> None:
         assert text
         assert "\n" not in text
     assert cls.advice.endswith(".")
+
+
+def test_a_choice_of_numbers_may_come_as_text() -> None:
+    @dataclass(frozen=True)
+    class Rays:
+        cones: Literal[1, 7] = param(7, doc="how many")
+
+    assert replace(Rays(), {"cones": "1"}).cones == 1
+    with pytest.raises(ParameterError, match="^cones: '3' is not one of 1, 7$"):
+        replace(Rays(), {"cones": "3"})
