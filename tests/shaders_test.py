@@ -71,7 +71,8 @@ def variants(family: str) -> list[tuple[str, dict[str, object]]]:
     """Each technique with its defaults, and once for each value of each text parameter."""
     found = []
     for name, cls in FAMILIES[family].members.items():
-        base: dict[str, object] = dict(SMALL.get(name, {}))
+        sides = {f.name: 64 for f in fields_of(cls) if family == "shadow" and f.name in ("size", "map_size")}
+        base: dict[str, object] = {**sides, **SMALL.get(name, {})}
         found.append((name, base))
         for f in fields_of(cls):
             choices = getattr(f.type, "__args__", ()) if isinstance(f.default, str) else ()
@@ -103,21 +104,22 @@ def test_every_entry_point_compiles_and_is_used(gpu: Gpu, monkeypatch: pytest.Mo
     solid = Scene(SHAPES[:2], LIGHTS[:1], props.AHEAD)  # maps of what has holes are not drawn in compute
     with Renderer(solid, (8, 6), gpu=gpu, shadow=ShadowMap(size=64, rasterizer="compute")) as renderer:
         renderer.draw()
-    short, long = (union(*[sphere(0.3 + 0.1 / i) for i in range(1, n)], smooth=0.1) for n in (7, 400))
+    monkeypatch.setattr("tyndall.sdf.field._LONG", 8)  # so that a short program's leaves are sorted out as well
+    short, long = (union(*[sphere(0.1).at(0.2 * i) for i in range(n)], smooth=0.1) for n in (6, 9))
     surface = Material(emissive=(1, 1, 1), reflections=True)
     surfaces = [Implicit(shape, _mirror, surface) for shape in (short, long)]
     cloud = Volume(sphere(0.5), Medium(0.1))
     fields = Scene(SHAPES[:1], LIGHTS[:1], props.AHEAD, Medium(0.1), implicits=surfaces, volumes=[cloud])
     with Renderer(fields, (8, 6), gpu=gpu, shadow=ShadowMap(size=16)) as renderer:
-        renderer.draw()  # reflections and clouds are drawn unless told otherwise
+        renderer.draw()  # reflections and clouds are drawn unless told otherwise, and compiled for each kind of shadow
+        for family in ("reflection", "volume"):
+            renderer.use(family, "none")
         renderer.use("occlusion", "field_ao")
         for name in ("field", "planar", "projective"):
             cls = FAMILIES["shadow"].members[name]
             small = {f.name: 16 for f in fields_of(cls) if f.name in ("size", "map_size")}
             renderer.use("shadow", FAMILIES["shadow"].make(name, changes=small))
             renderer.draw()
-    with Field(gpu, surfaces) as field:
-        values(gpu, field, 0, np.zeros((1, 3)))
     for depth in (2, 3):
         trace(scene, (8, 6), TruthSettings(target=1, depth=depth), gpu=gpu, cache=False)
     with World(gpu, scene, movable=True) as world:

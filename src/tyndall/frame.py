@@ -57,6 +57,7 @@ _MEDIUM = "package::wesl::medium::Medium"
 _MODULE = "package::frame"
 _PHASES = ("isotropic", "henyey_greenstein", "rayleigh", "gibbons", "schlick")  # as wesl/phase.wesl numbers them
 _KINDS = ("directional", "point", "spot", "rect")  # as wesl/light.wesl numbers them
+_DEPTH_OF = "fn depth_of(pixel: vec2u) -> f32 { return textureLoad(depth, pixel, 0); }"
 _UNBOUNDED = 1e10
 
 _IMAGES = {
@@ -194,11 +195,14 @@ class Renderer(Closing):
             "medium": self._medium.uniform(),
             "lights": self._lights.read().declaring(**light_kinds(self.scene)),
             "black": black.sampled(),
-            **{name: self._images[name].sampled() for name in _IMAGES if name != "picture"},
+            **{name: self._images[name].sampled() for name in _IMAGES if name not in ("depth", "picture")},
+            "depth": self._images["depth"].sampled().telling(_DEPTH_OF),
             "inscatter_out": self._images["inscatter"].write(),
             "transmittance_out": self._images["transmittance_map"].write(),
         }
+        self._drawn, self._marched = {"depth": self._scope["depth"]}, {"depth": self._scope["depth"]}
         if self._fields:
+            self._marched = {"depth": self._fields.depth.sampled().telling(_DEPTH_OF.replace("0);", "0).x;"))}
             self._scope |= self._fields.bindings
             self._scope |= {f"{name}_out": self._images[name].write() for name in self._targets}
         gpu.write(self._medium, pack_medium(self.scene.medium, gpu.dtype(_MEDIUM)))
@@ -319,6 +323,11 @@ class Renderer(Closing):
         if casters != self._casters:
             self._casters, self._history = casters, 0
         self._update(camera, jitter)
+        emissive = "emissive" in self._targets
+        # Clearing, and drawing a depth that is there already, takes a GPU that mostly computes more than a millisecond.
+        alone = self._fields is not None and not self.scene.instances
+        marched = alone and not any(view.technique.tests_depth for view in self._views.values())
+        self._scope["depth"] = (self._marched if marched else self._drawn)["depth"]
         scope = self._scope
 
         targets = [(images[name].view(), (0.0, 0.0, 0.0, 0.0)) for name in self._targets]
@@ -329,14 +338,13 @@ class Renderer(Closing):
             self._sent = field.uploaded
         # Its stencil, where it has one, is cleared with it: drivers pack the two, and clear both at once or neither.
         clear = 0 if images["depth"].has_stencil else None
-        emissive = "emissive" in self._targets
-        alone = self._fields is not None and not self.scene.instances  # clearing alone takes a GPU that computes 1 ms
         if not alone:
             with gpu.render("gbuffer.mesh", targets, (images["depth"].view(), 0.0), stencil=clear) as native:
                 for content in self._content:
                     content.draw_gbuffer(native, scope, emissive=emissive)
         for content in self._content:
-            content.march_gbuffer(scope, images["depth"], emissive=emissive, alone=alone)
+            depth = None if marched else images["depth"]
+            content.march_gbuffer(scope, depth, emissive=emissive, alone=alone)
 
         shadow = self._view("shadow")
         shadow.maps_wanted = self.technique("volumetric").reads_maps

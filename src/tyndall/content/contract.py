@@ -43,13 +43,13 @@ class Content(Protocol):
     def draw_gbuffer(self, native_pass: Any, scope: Mapping[str, Bound], *, emissive: bool) -> None:
         """Draw into the G-buffer; ``scope`` binds ``camera``. It has an emissive target only if some content emits."""
 
-    def march_gbuffer(self, scope: Mapping[str, Bound], depth: Texture, *, emissive: bool, alone: bool) -> None:
+    def march_gbuffer(self, scope: Mapping[str, Bound], depth: Texture | None, *, emissive: bool, alone: bool) -> None:
         """Put what is not drawn with triangles into the G-buffer, where it is nearer than what has been drawn.
 
         Args:
             scope: binds ``camera``, ``depth``, and for compute to write ``normal_roughness_out``,
                 ``albedo_metallic_out`` and, if some content emits, ``emissive_out``.
-            depth: to be drawn into.
+            depth: to be drawn into; None where nothing asks for it as a depth buffer.
             alone: nothing has been drawn, and nothing cleared: every pixel of the targets is written.
         """
 

@@ -75,6 +75,11 @@ class Fields:
             raise
 
     @property
+    def depth(self) -> Texture:
+        """What the last march found, r32float: reversed-Z, 0 where nothing was met."""
+        return self._images["depth"]
+
+    @property
     def bindings(self) -> dict[str, Bound]:
         """What the last march found: ``field_depth`` (reversed-Z, 0: nothing) and ``field_ids`` (see
         ``implicit.wesl``); and ``field_motion``.
@@ -114,11 +119,12 @@ class Fields:
     def draw_gbuffer(self, native_pass: Any, scope: Mapping[str, Bound], *, emissive: bool) -> None:
         """Nothing: it is marched."""
 
-    def march_gbuffer(self, scope: Mapping[str, Bound], depth: Texture, *, emissive: bool, alone: bool) -> None:
+    def march_gbuffer(self, scope: Mapping[str, Bound], depth: Texture | None, *, emissive: bool, alone: bool) -> None:
         """Put what is nearer than the G-buffer's depth into it; ``scope`` binds ``camera``, ``depth`` and the targets
         as ``…_out``.
 
         Args:
+            depth: None where :attr:`depth` is all that is asked for.
             alone: nothing was drawn before, and nothing cleared.
         """
         gpu, images = self._gpu, self._images
@@ -135,6 +141,8 @@ class Fields:
         gpu.compute("gbuffer.field_resolve", MODULE, "resolve").bind(bound, **self.bindings).features(
             scene_emits=emissive, alone=alone
         ).dispatch(*self._size)
+        if depth is None:
+            return
         stencil = 0 if alone and depth.has_stencil else None
         with gpu.render("gbuffer.field_depth", depth=(depth.view(), 0.0 if alone else None), stencil=stencil) as native:
             self._cover(native, Raster(depth=depth.format), "depth_fragment", self.bindings)

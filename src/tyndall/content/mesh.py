@@ -237,7 +237,7 @@ class Meshes:
         count = len(GBUFFER_TARGETS) if emissive else 2
         self._replay(native_pass, _Way("gbuffer", "back", count, self._gpu.depth_format), scope)
 
-    def march_gbuffer(self, scope: Mapping[str, Bound], depth: Texture, *, emissive: bool, alone: bool) -> None:
+    def march_gbuffer(self, scope: Mapping[str, Bound], depth: Texture | None, *, emissive: bool, alone: bool) -> None:
         """Nothing: all of it is drawn."""
 
     def prepare(self, what: Prepared, scope: Mapping[str, Bound], size: tuple[int, int], owner: str) -> None:

@@ -124,7 +124,7 @@ def test_lists_are_short(gpu: Gpu, field: Field) -> None:
     [
         ({"_LEAST_ENTRIES": 64, "_MOST_ENTRIES": 64}, True),
         ({"_LEAST_ENTRIES": 3000, "_MOST_ENTRIES": 3000}, True),
-        ({"_MOST_MARKS": 64}, True),
+        ({"_MOST_MARKS": 64, "_LONG": 1 << 20}, True),
         ({"_LONG": 20}, False),
         ({"_LONG": 20, "_LEAST_ENTRIES": 3000, "_MOST_ENTRIES": 3000}, True),
     ],

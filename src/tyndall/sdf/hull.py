@@ -16,6 +16,7 @@ import numpy as np
 from tyndall.sdf.repetition import Repetition
 from tyndall.sdf.shape import Box, Combination, Floats, Named, Painted, Shape, Transformed, transformed_box
 
+LEAST = 0.5  # of a motion's stretches, for which the boxes are
 _Chain = tuple[tuple[bytes, str, int], ...]  # static transforms, each before a named part's motion
 
 
@@ -43,11 +44,11 @@ class Hull:
         return cls(tuple(groups))
 
     def box(self, moves: Mapping[str, Floats]) -> Box | None:
-        """The box where the parts are moved by (N, 4, 4) transforms a name; None where one of them is no rigid motion,
-        of which smooth unions' reach would be another one.
+        """The box where the parts are moved by (N, 4, 4) transforms a name; None where one of them makes its part much
+        smaller, as what smooth unions add would be more of it.
         """
         for matrices in moves.values():
-            if np.abs(matrices[:, :3, :3].transpose(0, 2, 1) @ matrices[:, :3, :3] - np.eye(3)).max() > 1e-6:
+            if np.linalg.svd(matrices[:, :3, :3], compute_uv=False).min() < LEAST:
                 return None
         lows, highs = [], []
         for steps, box in self.groups:
@@ -87,7 +88,7 @@ def _gather(
         case Named():
             step = (np.ascontiguousarray(matrix).tobytes(), shape.name, order[shape.name])
             order[shape.name] += 1
-            return _gather(shape.shape, np.eye(4), (*chain, step), level, order, boxes)
+            return _gather(shape.shape, np.eye(4), (*chain, step), level / LEAST, order, boxes)
         case Combination(operation="union"):
             more = level + shape.swell * math.ceil(math.log2(len(shape.shapes)))
             return all(_gather(child, matrix, chain, more, order, boxes) for child in shape.shapes)

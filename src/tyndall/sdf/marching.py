@@ -13,7 +13,7 @@ class Marching:
 
     steps: int = param(256, 1, 4096, "most steps of a ray through one object")
     distance: float = param(1e6, 1e-3, 1e9, "farthest that a ray goes", unit="m")
-    threshold: float = param(0.2, 0, 8, "how near a surface is met: outlines are wider by as much", unit="pixel")
+    threshold: float = param(0.35, 0, 8, "how near a surface is met: outlines are wider by as much", unit="pixel")
 
     def __post_init__(self) -> None:
         check(self)

@@ -35,6 +35,7 @@ class Technique:
         reads_maps: whether it reads the shadow maps themselves, beyond asking for visibility.
         lights_air: whether it asks the shadow technique about points in the air.
         casts_rays: whether it asks :attr:`View.world`; the frame then builds it before it records anything.
+        tests_depth: whether it draws against the picture's depth buffer, beyond asking for a pixel's depth.
         receivers: what a shadow technique shades: all surfaces, or flat ones only ("planes"); the rest is lit.
     """
 
@@ -44,6 +45,7 @@ class Technique:
     reads_maps: ClassVar[bool] = False
     lights_air: ClassVar[bool] = True
     casts_rays: ClassVar[bool] = False
+    tests_depth: ClassVar[bool] = False
     receivers: ClassVar[Literal["all", "planes"]] = "all"
 
     def __post_init__(self) -> None:

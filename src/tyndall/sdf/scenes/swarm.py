@@ -116,7 +116,7 @@ def _swarm(count: int, seed: int) -> tuple[Shape, Floats]:
         color = COLORS[int(len(COLORS) * u[i] / (2 * math.pi) + shades[i]) % len(COLORS)]
         x, y, z = (float(v) for v in places[i])
         grains.append(_grain(float(kinds[i]), float(sizes[i])).named("swarm").at(x, y, z).material(color))
-    return union(*grains, smooth=0.8 * mean), places[order]
+    return union(*grains, smooth=0.35 * mean), places[order]
 
 
 def swarm(count: int = COUNT, lights: int = 1, seed: int = 0) -> Scene:

@@ -75,7 +75,8 @@ class FieldShadows(Technique):
         if meshes:
             cast = maps.render(view.part(maps), meshes)
         else:
-            cast = walked or maps.render(view.part(ShadowMap(size=16), "empty"), [])
+            empty = ShadowMap(size=16)
+            cast = walked or view.keep("empty", empty, lambda: empty.render(view.part(empty, "empty"), []))
         answers = mask_image(view)
         soft = [light.extent > 0 for light in view.scene.lights]
         known = {

@@ -50,6 +50,7 @@ class PenumbraWedge(Technique):
     advice: ClassVar[str] = (
         "Soft shadows without noise or texels, near exact for solid casters; its cost grows with outline and light."
     )
+    tests_depth: ClassVar[bool] = True
 
     map_size: int = param(1024, 16, 16384, "maps for the air and for surfaces with holes", unit="texel", rebuild=True)
 

@@ -54,6 +54,7 @@ class ShadowVolume(Technique):
     advice: ClassVar[str] = (
         "Hard shadows exact to the pixel, without texels or bias; its cost is the area that volumes cover."
     )
+    tests_depth: ClassVar[bool] = True
 
     method: Literal["zpass", "zfail"] = param("zfail", doc="count before the point, or beyond it: right from anywhere")
     darken_by_count: float = param(0.0, 0, 1, "light that each volume takes; 0: one takes all")

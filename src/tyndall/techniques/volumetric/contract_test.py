@@ -26,8 +26,10 @@ from tyndall.scene.model import (
     DirectionalLight,
     Gibbons,
     HenyeyGreenstein,
+    Implicit,
     Instance,
     Isotropic,
+    Material,
     Medium,
     PointLight,
     Rayleigh,
@@ -35,7 +37,9 @@ from tyndall.scene.model import (
     Scene,
     Schlick,
     SpotLight,
+    Volume,
 )
+from tyndall.sdf import sphere
 from tyndall.techniques import FAMILIES, Technique
 from tyndall.techniques.contract import Unsupported
 from tyndall.techniques.shadow.shadow_map import ShadowMap
@@ -496,6 +500,13 @@ def test_every_parameter_from_end_to_end(gpu: Gpu, family: str, name: str, model
     )
     cls = FAMILIES[family].members[name]
     base = {**SMALL.get(name, {}), **({"model": model} if model else {})}
+    if "field" in name:  # they need something to ask
+        ball = Implicit(sphere(0.3).at(0, 0, -2), material=Material(reflections=family == "reflection"))
+        scene = replace(scene, implicits=[ball])
+    if family == "volume":
+        scene = replace(scene, volumes=[Volume(sphere(0.4).at(0, 0, -2), AIR)])
+    if family == "shadow" and "size" in {f.name for f in fields_of(cls)}:
+        base["size"] = 256
     cases: list[dict[str, Any]] = [{}]
     for f in fields_of(cls):
         cases += [{f.name: value} for value in extremes(f) if f.name != "model"]

@@ -53,6 +53,7 @@ class Polygonal(Technique):
     advice: ClassVar[str] = (
         "Sharp, noise-free shafts in a uniform medium, best for the sun; cost grows with map² × lights."
     )
+    tests_depth: ClassVar[bool] = True
     reads_maps: ClassVar[bool] = True
 
     model: Literal["physical", "paper"] = param("physical", doc="the scene's medium, or S1's equation")
