@@ -462,6 +462,19 @@ class Renderer(Closing):
         elif len(given) > len(objects):
             raise ParameterError(f"{name}: {len(given)} transforms for {len(objects)} objects")
 
+    def edit(self, name: str, **changes: Any) -> None:
+        """From the next frame on, the primitives of a name have other parameters: ``edit("ball", radius=0.3)``. Some
+        numbers are uploaded; as with :meth:`move`, maps of lights are not fitted anew.
+
+        Raises:
+            ParameterError: no such name, a part that is no primitive, or a value that it does not allow.
+        """
+        if self._fields is None or name not in self._fields.parts:
+            self._unknown(name)
+        else:
+            self._fields.field.edit(name, **changes)
+            self._moved = True
+
     def _objects(self, name: str) -> list[int]:
         return [i for i, one in enumerate(self.scene.implicits) if name and one.name == name]
 

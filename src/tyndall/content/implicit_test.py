@@ -220,6 +220,26 @@ def test_a_placed_object_is_drawn_where_it_is(gpu: Gpu) -> None:
             renderer.place(0, np.eye(4) + np.eye(4)[[3, 0, 1, 2]])
 
 
+def test_an_edited_part_is_drawn_as_it_is(gpu: Gpu) -> None:
+    light = DirectionalLight((0.5, -1.0, -0.35), 3.0)
+
+    def made(radius: float) -> Scene:
+        shape = sphere(radius).named("ball") | sphere(0.2).at(1)
+        room = ((-4.0, 0.0, -4.0), (4.0, 3.0, 4.0))
+        return Scene([props.floor(0, 4)], [light], ABOVE, implicits=[Implicit(shape, at(0, 0.6, 0), WHITE)], room=room)
+
+    with Renderer(made(0.2), SIZE, gpu=gpu, volumetric="off", antialiasing="none") as renderer:
+        renderer.draw()
+        renderer.edit("ball", radius=0.5)
+        renderer.draw()
+        apart = np.abs(renderer.base() - drawn(gpu, made(0.5))).max(axis=-1) > 0.01
+        assert apart.mean() < 0.02, "but for outlines: it has other cells"
+        with pytest.raises(ParameterError, match="did you mean 'ball'"):
+            renderer.edit("bal", radius=0.5)
+        with pytest.raises(ParameterError, match="radius: -1 is outside"):
+            renderer.edit("ball", radius=-1)
+
+
 def test_a_frame_that_failed_is_not_missed(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
     """What it would have sorted into cells is sorted by the next one."""
     beads = union(*(sphere(0.2).at(0.3 * i - 1) for i in range(9)))

@@ -421,7 +421,7 @@ class Implicit:
         shape: signed distances in its own space, a :class:`tyndall.sdf.Shape` of three dimensions.
         transform: 4×4 affine (row-major, column vectors: p' = M·p) from its own space to the world.
         material: of what in it has none of its own.
-        name: by which a frame moves and edits it.
+        name: by which a frame places and moves it.
 
     Raises:
         ParameterError: a flat shape, or a transform that has no inverse.

@@ -516,6 +516,10 @@ class Field(Closing):
                 if unknown:
                     raise ParameterError(f"{name}: a {type(leaf.shape).__name__} has no {unknown[0]}")
                 shape: Any = dataclasses.replace(leaf.shape, **changes)
+                if getattr(shape, "payload", None) is not None or shape.lipschitz > leaf.shape.lipschitz * (1 + 1e-9):
+                    raise ParameterError(
+                        f"{name}: a {type(shape).__name__} with samples or a greater bound is a new scene"
+                    )
                 made.program.leaves[index] = dataclasses.replace(leaf, shape=shape)
                 numbers = np.zeros(8, np.float32)
                 numbers[: len(shape.numbers)] = shape.numbers

@@ -13,7 +13,7 @@ from tyndall.gpu.device import Gpu, GpuError
 from tyndall.gpu.params import ParameterError
 from tyndall.lab import field_check
 from tyndall.scene.model import Implicit
-from tyndall.sdf import Shape, box, intersection, sphere, subtraction, torus, union
+from tyndall.sdf import Grid, Shape, box, intersection, sphere, subtraction, torus, union
 from tyndall.sdf.field import Field
 from tyndall.sdf.marching import Marching
 from tyndall.sdf.shape import Blend, rotation
@@ -281,6 +281,15 @@ def test_what_cannot_be_moved(gpu: Gpu, field: Field) -> None:
         field.move("ball", np.zeros((300, 4, 4)))
     with pytest.raises(ParameterError, match="has no width"):
         field.edit("bead", width=1)
+
+
+def test_samples_cannot_be_edited(gpu: Gpu) -> None:
+    """Their place is among a grid's numbers, and its bound follows from them."""
+    grid = Grid(
+        np.where(np.indices((4, 4, 4)).min(0) * (3 - np.indices((4, 4, 4))).min(0) > 0, -1.0, 1.0), (0, 0, 0), 1.0
+    )
+    with Field(gpu, [Implicit(grid.named("grid"))]) as field, pytest.raises(ParameterError, match="grid: a Grid with"):
+        field.edit("grid", step=0.5)
 
 
 @pytest.mark.parametrize("kind", ["twist", "bend", "repetition without end"])

@@ -13,6 +13,7 @@ from tyndall.frame import Renderer
 from tyndall.gpu.device import Gpu
 from tyndall.scene.model import Camera, DirectionalLight, Implicit, Material, Scene
 from tyndall.sdf import box, sphere
+from tyndall.sdf.shading import FragmentShader
 from tyndall.techniques.reflection.field_reflections import FieldReflections
 from tyndall.techniques.reflection.none import NoReflections
 
@@ -136,6 +137,21 @@ def test_white_things_in_even_light_vanish(gpu: Gpu, material: Material) -> None
     ]
     got = draw(gpu, Scene(camera=camera, background=(1, 1, 1), ambient=(1, 1, 1), implicits=fields(*things)))
     np.testing.assert_allclose(got, 1, atol=4e-3)
+
+
+def test_a_users_shader_is_told_the_same_of_what_is_polished(gpu: Gpu) -> None:
+    """A ball coloured by its normal: 4 % and more mirror what is black, and the rest is as without."""
+    shader = FragmentShader(
+        "n", "fn shade(properties: FragmentProperties) -> vec3f { return abs(properties.world_normal); }"
+    )
+    camera = Camera((0, 0, 4), (0, 0, 0), fov=0.3, near=0.05)
+
+    def drawn(reflections: bool) -> np.ndarray:
+        material = shader.material(material=Material(reflections=reflections))
+        ball = Implicit(sphere(1.0), material=material)
+        return draw(gpu, Scene(camera=camera, ambient=(1, 1, 1), implicits=fields(ball)), size=(16, 16))
+
+    np.testing.assert_allclose(drawn(True), 0.96 * drawn(False), atol=0.06)
 
 
 def test_beers_law_inside(gpu: Gpu) -> None:
