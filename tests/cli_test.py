@@ -469,7 +469,7 @@ def test_closed_and_full_streams_are_no_faults() -> None:
 
 
 def test_parameters_in_a_scene_file_are_named_with_the_file(capsys: pytest.CaptureFixture[str], folder: Path) -> None:
-    looks = {"froxl": {"samples": 2}, "froxel": {"gird": [1, 1, 1]}, "march": {"steps": 0}}
+    looks = {"froxl": {"samples": 2}, "froxel": {"gird": [1, 1, 1]}, "march": {"steps": 0}, "marching": {"step": 9}}
     (folder / "room.json").write_text(json.dumps({"version": 1, "looks": looks}))
     code, _, err = run(capsys, "render", "room.json")
     assert code == 2
@@ -477,6 +477,7 @@ def test_parameters_in_a_scene_file_are_named_with_the_file(capsys: pytest.Captu
         "tyndall: room.json: looks.froxl: no such technique — did you mean 'froxel'?",
         "tyndall: room.json: looks.froxel.gird: no such parameter — did you mean 'grid'?",
         "tyndall: room.json: looks.march.steps: 0 is outside 1 … 30000",
+        "tyndall: room.json: looks.marching.step: no such parameter — did you mean 'steps'?",
     ]
 
 

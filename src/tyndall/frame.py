@@ -26,6 +26,7 @@ from tyndall.content.implicit import Fields
 from tyndall.content.mesh import GBUFFER_TARGETS, Meshes
 from tyndall.gpu.device import Gpu, GpuError
 from tyndall.gpu.params import ParameterError, nearest
+from tyndall.gpu.params import replace as changed
 from tyndall.gpu.resources import Closing, Resource, Texture
 from tyndall.scene.model import (
     Camera,
@@ -167,7 +168,7 @@ class Renderer(Closing):
         self._meshes = Meshes(gpu, self.scene)
         self._content = [self._meshes]
         if self.scene.implicits:
-            marching = self._marching or replace(Marching(), **self.scene.looks.get("marching", {}))
+            marching = self._marching or changed(Marching(), self.scene.looks.get("marching", {}))
             self._fields = Fields(gpu, self.scene, size, marching)
             self._content.append(self._fields)
         for volume in self.scene.volumes:
@@ -306,6 +307,8 @@ class Renderer(Closing):
             self.gpu.discard()  # half a frame must not precede the next one
             for view in self._views.values():
                 view.forget()
+            for field in [*([self._fields.field] if self._fields else []), *(filled.field for filled in self._volumes)]:
+                field.forget()
             raise
         self.gpu.submit()
         self._frame += 1
@@ -421,9 +424,11 @@ class Renderer(Closing):
             if len(found) > 1:
                 raise ParameterError(f"which: {len(found)} implicit surfaces are called '{which}'; give a number")
             which = found[0]
-        if self._fields is None or not 0 <= which < len(self.scene.implicits):
+        if self._fields is None or which not in range(len(self.scene.implicits)):
             raise ParameterError(f"which: the scene has {len(self.scene.implicits)} implicit surfaces, and no {which}")
-        (matrix,) = transforms("transform", transform)
+        matrix = transforms("transform", transform)[0]
+        if np.shape(transform) != (4, 4):
+            raise ParameterError(f"transform: shape {np.shape(transform)} is not (4, 4)")
         placed = replace(self.scene.implicits[which], transform=matrix)
         self._fields.place(which, matrix)
         self._moved = True
@@ -454,6 +459,8 @@ class Renderer(Closing):
             self._moved = True
         elif not objects:
             self._unknown(name)
+        elif len(given) > len(objects):
+            raise ParameterError(f"{name}: {len(given)} transforms for {len(objects)} objects")
 
     def _objects(self, name: str) -> list[int]:
         return [i for i, one in enumerate(self.scene.implicits) if name and one.name == name]

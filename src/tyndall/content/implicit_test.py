@@ -28,7 +28,7 @@ from tyndall.scene.model import (
     Scene,
     SpotLight,
 )
-from tyndall.sdf import sphere
+from tyndall.sdf import sphere, union
 from tyndall.techniques import FAMILIES
 from tyndall.techniques.shadow.shadow_map import ShadowMap
 from tyndall.techniques.volumetric.march import March
@@ -212,6 +212,27 @@ def test_a_placed_object_is_drawn_where_it_is(gpu: Gpu) -> None:
             renderer.place(2, np.eye(4))
         with pytest.raises(ParameterError, match="neither of 4×4 transforms"):
             renderer.move("left", [1, 2])
+        with pytest.raises(ParameterError, match="left: 2 transforms for 1 object"):
+            renderer.move("left", [(0, 0, 0), (0, 0, 0)])
+        with pytest.raises(ParameterError, match=r"shape \(3, 3\) is not \(4, 4\)"):
+            renderer.place(0, np.eye(3))
+        with pytest.raises(ParameterError, match="last row"):
+            renderer.place(0, np.eye(4) + np.eye(4)[[3, 0, 1, 2]])
+
+
+def test_a_frame_that_failed_is_not_missed(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What it would have sorted into cells is sorted by the next one."""
+    beads = union(*(sphere(0.2).at(0.3 * i - 1) for i in range(9)))
+    scene = Scene(
+        (), [DirectionalLight((0.5, -1.0, -0.35), 3.0)], ABOVE, implicits=[Implicit(beads, at(0, 0.5, 0), WHITE)]
+    )
+    with Renderer(scene, SIZE, gpu=gpu, volumetric="off", antialiasing="none") as renderer:
+        with monkeypatch.context() as patch:
+            patch.setattr(ShadowMap, "render", lambda *_: 1 / 0)
+            with pytest.raises(ZeroDivisionError):
+                renderer.draw()
+        renderer.draw()
+        np.testing.assert_array_equal(renderer.base(), drawn(gpu, scene))
 
 
 @pytest.mark.parametrize("shadow", ["shadow_map", "projective"])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from tyndall.gpu.params import ParameterError, nearest, replace
 from tyndall.lab import bundled
@@ -44,14 +45,16 @@ def open_scene(name: str, lights: int | None = None) -> Scene:
 
 
 def _check_looks(scene: Scene, name: str) -> None:
-    """Parameters of techniques in a scene file are right, also those of techniques that are not drawn.
+    """Parameters of techniques and of rays in a scene file are right, also those of techniques that are not drawn.
 
     Raises:
         SceneError: one line for each that is not.
     """
+    from tyndall.sdf.marching import Marching
     from tyndall.techniques import FAMILIES
 
-    members = {member: cls for family in FAMILIES.values() for member, cls in family.members.items()}
+    members: dict[str, type[Any]] = {"marching": Marching}
+    members |= {member: cls for family in FAMILIES.values() for member, cls in family.members.items()}
     wrong = []
     for technique, look in scene.looks.items():
         if technique not in members:

@@ -438,6 +438,8 @@ class Implicit:
         matrix = np.asarray(self.transform, np.float64)
         if matrix.shape != (4, 4) or not np.isfinite(matrix).all() or abs(np.linalg.det(matrix[:3, :3])) < 1e-30:
             raise ParameterError("transform: not 4×4 finite numbers that have an inverse")
+        if not np.array_equal(matrix[3], (0, 0, 0, 1)):
+            raise ParameterError("transform: its last row is not 0, 0, 0, 1")
         rows = tuple(tuple(float(x) for x in row) for row in matrix)
         object.__setattr__(self, "transform", rows)
 
@@ -620,7 +622,10 @@ def transforms(name: str, value: ArrayLike) -> NDArray[np.float64]:
     Raises:
         ParameterError: another shape of array; ``name`` says whose.
     """
-    given = np.asarray(value, np.float64)
+    try:
+        given = np.asarray(value, np.float64)
+    except (TypeError, ValueError):
+        raise ParameterError(f"{name}: {value!r:.60} is neither transforms nor ways") from None
     if given.shape[-2:] == (4, 4) and given.ndim in (2, 3):
         return given.reshape(-1, 4, 4)
     if given.ndim == 2 and given.shape[1] == 3:

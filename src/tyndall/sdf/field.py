@@ -11,7 +11,7 @@ rounding. Cells in which no surface can be hold no program, only the value at th
 Practice. Each object (:class:`~tyndall.scene.model.Implicit`) has cells in its own space. So placing an object
 elsewhere is one buffer write, and nothing is pruned again; moving a part of it prunes that object alone. Programs of
 four instructions or fewer need no cells, and what has no end has none: all of its program is run. Lists that do not fit
-are the parent's: slower, never wrong.
+are the parent's, and where cells of all objects do not fit some have fewer: slower, never wrong.
 
 What shaders need is in :attr:`Field.bindings`: five buffers, and in the bindings module itself a switch over the kinds
 of primitives that are in use.
@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tyndall.gpu.device import ComputePass, Gpu
+from tyndall.gpu.device import ComputePass, Gpu, GpuError
 from tyndall.gpu.params import ParameterError, nearest
 from tyndall.gpu.resources import Buffer, Closing, ParamsBuffer, Resource
 from tyndall.scene.model import Implicit, Material
@@ -56,6 +56,7 @@ _LONGEST = 32 * 1024  # of those; beyond, cells walk all of it; as in prune.wesl
 _SEGMENT = 256  # of them, as in prune.wesl
 _FEW_MARKS = 128  # instructions whose marks need no memory; as in prune.wesl
 _MOST_MARKS = 1 << 23  # words
+_MOST_SLOTS = 1 << 24  # before samples, whose place is a float
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,6 +203,11 @@ class Field(Closing):
             raise
 
     def _buffer(self, label: str, data: NDArray[Any] | int, element: str) -> Buffer:
+        size = data if isinstance(data, int) else data.nbytes
+        if size > self._gpu.part_bytes:
+            raise GpuError(
+                f"{self._owner}.{label}: {size:,} bytes; shaders of this adapter see {self._gpu.part_bytes:,}"
+            )
         buffer = self._gpu.buffer(f"{self._owner}.{label}", data, owner=self._owner, element=element)
         self._buffers.append(buffer)
         return buffer
@@ -213,25 +219,28 @@ class Field(Closing):
     def _upload(self, implicits: Sequence[Implicit]) -> None:
         gpu = self._gpu
         words = slots = materials = cells = entries = 0
-        for implicit in implicits:
+        for left, implicit in zip(range(len(implicits))[::-1], implicits, strict=True):
             shape: Any = implicit.shape
             program = compile_shape(shape, self._kinds)
-            levels = self._levels(program, shape.box)
-            capacity = int(np.clip(4096 * program.size, _LEAST_ENTRIES, _MOST_ENTRIES))
-            made = _Object(
-                implicit, program, words, slots, materials, levels, cells, entries, capacity if levels else 0, shape.box
-            )
+            levels = self._levels(program, shape.box, gpu.part_bytes // 16 - cells - left * _COARSE**3)
+            capacity = int(np.clip(4096 * program.size, _LEAST_ENTRIES, _MOST_ENTRIES)) if levels else 0
+            made = _Object(implicit, program, words, slots, materials, levels, cells, 0, capacity, shape.box)
             self._objects.append(made)
             words, slots = words + program.size, slots + len(program.slots)
             materials += 1 + len(program.materials)
             cells, entries = cells + made.cells, entries + made.capacity
+        room = max(0, gpu.part_bytes // 8 - words)
+        if entries > room:
+            for made in self._objects:
+                made.capacity = made.capacity * room // entries
+        entries = 0
+        for made in self._objects:
+            made.first_entry, entries = words + entries, entries + made.capacity
         listed = [m for o in self._objects for m in (o.implicit.material, *o.program.materials)]
         shaded = [self._shadings.of(m) for m in listed]
         for source in self._kinds.sources():
             validate(gpu, source)
         self._shadings.validate(gpu)
-        for made in self._objects:
-            made.first_entry += words
         self._words = np.concatenate([np.zeros((0, 2), np.uint32), *(self._placed_words(o) for o in self._objects)])
         numbers = self._shadings.numbers  # in rows after all slots
         rows = np.zeros((-(-len(numbers) // 4), 4), np.float32)
@@ -246,7 +255,7 @@ class Field(Closing):
         self._cell_buffer = self._buffer("cells", 16 * max(1, cells), "vec4u")
         self._counter_buffer = self._buffer("counters", 4 * _COUNTERS * max(1, len(self._objects)), "atomic<u32>")
         longest = max((o.program.size for o in self._objects if o.levels), default=1)
-        marks = int(np.clip(_FINE**3 * -(-(longest - _FEW_MARKS) // 16), 64, _MOST_MARKS))
+        marks = int(np.clip(_FINE**3 * -(-(longest - _FEW_MARKS) // 16), 64, min(_MOST_MARKS, gpu.part_bytes // 4)))
         self._marks_capacity = marks
         self._mark_buffer = self._buffer("marks", 4 * marks, "u32")
         words = max((-(-o.program.size // 32) for o in self._objects if self._is_long(o)), default=0)
@@ -266,11 +275,16 @@ class Field(Closing):
             self._describe(index)
         self.bindings = self._bind()
 
-    def _levels(self, program: Program, box: Box) -> int:
+    def _levels(self, program: Program, box: Box, room: int) -> int:
+        """How often an object's box is divided; by less than it should where there is no room for as many cells."""
         bounded = bool(np.isfinite(box[0]).all() and np.isfinite(box[1]).all())
-        if not bounded or not self._pruning or program.size <= _DIVIDED:
+        empty = bool((box[0] == box[1]).all())  # nothing is inside
+        if not bounded or empty or not self._pruning or program.size <= _DIVIDED:
             return 0
-        return 1 if program.size <= 8 else 2
+        levels = 1 if program.size <= 8 else 2
+        while levels and sum((_COARSE**3, _FINE**3)[:levels]) > room:
+            levels -= 1
+        return levels
 
     def _placed_words(self, made: _Object) -> NDArray[np.uint32]:
         words = made.program.words.copy()
@@ -280,7 +294,9 @@ class Field(Closing):
     def _placed_slots(self, made: _Object) -> NDArray[np.float32]:
         slots: NDArray[np.float32] = made.program.slots.copy()
         for row in made.program.payload_rows:
-            slots[row, 0] += made.first_slot + 1
+            if (at := int(slots[row, 0]) + made.first_slot + 1) > _MOST_SLOTS:
+                raise GpuError(f"samples of grids: more than {4 * _MOST_SLOTS:,} numbers before them")
+            slots[row, 0] = at
         rows = made.program.material_rows
         named = slots[rows, 2] >= 0
         slots[rows[named], 2] += made.first_material + 1
@@ -370,7 +386,8 @@ class Field(Closing):
             matrices: (N, 4, 4) transforms or (N, 3) ways in metres, for the N parts of that name in order.
 
         Raises:
-            ParameterError: no such name, another number of transforms, or one that has no inverse.
+            ParameterError: no such name, parts inside of a twist, bend or repetition without end, another number of
+                transforms, or one that has no inverse.
         """
         given = np.asarray(matrices, np.float64)
         sets = self._parts(name)
@@ -389,6 +406,8 @@ class Field(Closing):
         for made in self._objects:
             if name in made.program.names:
                 if name not in made.parts:
+                    if held := next((part.held for part in made.program.names[name] if part.held), ""):
+                        raise ParameterError(f"{name}: it is inside of a {held}, which is made for where it is at rest")
                     made.parts[name] = _Parts.of(name, made.program.names[name])
                 found.append((made, made.parts[name]))
         if not found:
@@ -506,6 +525,9 @@ class Field(Closing):
                 self._slots[at + 3, 1] *= shape.lipschitz / leaf.shape.lipschitz
                 self._write(self._slot_buffer, self._slots[at + 1 : at + 4], 16 * (at + 1))
             made.halves = None
+            if made.program.margin < 0:  # its box is that of the whole expression
+                edited = made.shape.edited(name, changes)
+                made.implicit, made.has_hull = dataclasses.replace(made.implicit, shape=edited), False
             made.dirty = made.moved = True
 
     def _jobs(self, index: int) -> list[Any]:
@@ -539,6 +561,11 @@ class Field(Closing):
     def _is_long(self, made: _Object) -> bool:
         """Whether its leaves are sorted out before the coarse cells walk its program."""
         return made.levels > 1 and _LONG < made.program.size <= _LONGEST
+
+    def forget(self) -> None:
+        """What was recorded is never submitted: the next :meth:`update` records it again."""
+        for made in self._objects:
+            made.dirty = True
 
     def update(self) -> None:
         """Record the pruning of what has changed, before what asks the field."""

@@ -9,7 +9,7 @@ import props
 import pytest
 from numpy.typing import NDArray
 
-from tyndall.gpu.device import Gpu
+from tyndall.gpu.device import Gpu, GpuError
 from tyndall.gpu.params import ParameterError
 from tyndall.lab import field_check
 from tyndall.scene.model import Implicit
@@ -142,6 +142,36 @@ def test_other_ways_say_the_same(
         assert (field.counters()[:, 1] > 0).any() == overflows
 
 
+def test_objects_share_what_room_there_is(gpu: Gpu, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Beyond what a shader sees of a buffer, some have fewer cells and shorter lists; what needs more is refused."""
+    monkeypatch.setattr(gpu, "part_bytes", 6 << 20)
+    with Field(gpu, IMPLICITS) as field:
+        assert all(buffer.size_bytes <= 6 << 20 for buffer in field.resources())
+        assert sorted({made.levels for made in field._objects}) == [1, 2]
+        for index, name in enumerate(NAMES):
+            agree(gpu, field, index, SHAPES[name], 1500, oracle=300)
+    monkeypatch.setattr(gpu, "part_bytes", 4096)
+    with pytest.raises(GpuError, match="shaders of this adapter see 4,096"):
+        Field(gpu, IMPLICITS)
+
+
+def test_nothing_is_inside(gpu: Gpu) -> None:
+    shape = intersection(*(sphere(0.1).at(*at) for at in ((0, 0, 0), (5, 5, 5), (0, 5, 0), (5, 0, 0), (0, 0, 5))))
+    with Field(gpu, [Implicit(shape)]) as field:
+        whole, _, _, told = field_check.values(gpu, field, 0, np.zeros((1, 3))).T
+        assert told > 0
+        np.testing.assert_allclose(whole, shape(np.zeros((1, 3))), rtol=1e-5)
+
+
+def test_pruning_that_was_never_submitted_is_done_again(gpu: Gpu) -> None:
+    index = NAMES.index("nest")
+    with Field(gpu, [IMPLICITS[index]]) as field:
+        field.update()
+        gpu.discard()
+        field.forget()
+        agree(gpu, field, 0, SHAPES["nest"], 1000)
+
+
 def test_without_cells(gpu: Gpu) -> None:
     with Field(gpu, IMPLICITS, pruning=False) as field:
         for index, name in enumerate(NAMES):
@@ -176,6 +206,30 @@ def test_moved_parts_are_where_they_were_moved(
     for given in (turns(count, rng) if turned else rng.normal(0, 0.2, (count, 3)), np.zeros((count, 3))):
         field.move(part, given)
         agree(gpu, field, NAMES.index(name), moved(SHAPES[name], part, given))
+
+
+@pytest.mark.parametrize("factor", [0.15, 2.0])
+def test_scaled_parts_are_pruned_by_their_new_slopes(gpu: Gpu, factor: float) -> None:
+    """Within a part that is made smaller values change faster than where it was compiled, and in parts of it."""
+    rng = np.random.default_rng(5)
+    balls = union(*(sphere(0.1).at(*rng.uniform(-0.5, 0.5, 3)) for _ in range(8)), smooth=0.1).named("inner")
+    inside = union(balls, box(0.3).at(0.5, 0.5)).scale((1, 0.5, 1)).round(0.02).named("outer")
+    shape = inside | sphere(0.1).at(0, 0.8)
+    scale = np.diag([factor] * 3 + [1.0])[None]
+    with Field(gpu, [Implicit(shape)]) as field:
+        for name in ("outer", "inner"):
+            field.move(name, scale)
+        agree(gpu, field, 0, shape.moved({"outer": iter(scale), "inner": iter(scale)}))
+
+
+def test_an_edited_part_below_other_than_unions_has_room(gpu: Gpu) -> None:
+    def made(radius: float) -> Shape:
+        return subtraction(sphere(radius).named("ball"), *(box(0.1).at(*at) for at in np.eye(3)), box(0.2))
+
+    with Field(gpu, [Implicit(made(0.5))]) as field:
+        field.edit("ball", radius=1.5)
+        agree(gpu, field, 0, made(1.5))
+        assert (field._objects[0].box[1] >= 1.5).all()
 
 
 def test_an_edited_part(gpu: Gpu, field: Field) -> None:
@@ -227,6 +281,17 @@ def test_what_cannot_be_moved(gpu: Gpu, field: Field) -> None:
         field.move("ball", np.zeros((300, 4, 4)))
     with pytest.raises(ParameterError, match="has no width"):
         field.edit("bead", width=1)
+
+
+@pytest.mark.parametrize("kind", ["twist", "bend", "repetition without end"])
+def test_what_is_held_where_it_is(gpu: Gpu, kind: str) -> None:
+    """The radius of a twist or bend, and the cap of a repetition, are those of the shape at rest."""
+    part = union(sphere(0.1).named("part"), box(0.2))
+    shape = part.repeat((1, 0, 0)) & box(3) if kind.startswith("rep") else getattr(part, kind)(1.0)
+    with Field(gpu, [Implicit(shape)]) as field:
+        for change in (lambda: field.move("part", np.ones((1, 3))), lambda: field.edit("part", radius=0.2)):
+            with pytest.raises(ParameterError, match=f"part: it is inside of a {kind}"):
+                change()
 
 
 # --- rays ---------------------------------------------------------------------------------------------------------

@@ -22,7 +22,11 @@ Slots, in vec4f; ``k`` is the width of a smooth join, ``L`` the Lipschitz bound 
   the transform from the object's to the leaf's space. The translation is subtracted; the rows hold theirs themselves.
 - COMBINE: ``(k, L, −, −)``.
 - ENTER and LEAVE of a modifier: ``(a) (b) (−, L, −, −)``; of an affine transform (code AFFINE) ``(row) (row) (row)
-  (factor, L, −, −)``.
+  (factor, L, s, −)``.
+
+L is in the space around the scope: that of the object, or inside the last ENTER of an affine transform, which a name
+may scale at any time. There places change by s/factor as fast as in the space around it, where s is what modifiers
+between the two add.
 
 A leaf that only unions lie above has a *margin* ≥ 0, others −1: where its value is above that of the whole by more than
 the margin, it does not matter. A smooth union of width k is at least a − k where a still matters, so the margin is the
@@ -45,6 +49,7 @@ from numpy.typing import NDArray
 
 from tyndall.gpu.params import ParameterError
 from tyndall.scene.model import Material
+from tyndall.sdf.modifiers import Turning
 from tyndall.sdf.repetition import Repetition
 from tyndall.sdf.shape import (
     Combination,
@@ -176,6 +181,7 @@ class Part:
         leaf: its number among the leaves; −1: it is more than one, and has a transform of its own.
         before, after: 4×4, from its parent's space to the object's (or the scope's), and from its own to its parent's.
         factor: distances at rest, of the leaf or the transform.
+        held: what is around it whose numbers follow from where it is at rest, so that it cannot move; "" for nothing.
     """
 
     number: int
@@ -185,6 +191,7 @@ class Part:
     before: Floats
     after: Floats
     factor: float
+    held: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -278,6 +285,7 @@ class _Context:
     margin: float = 0.0
     order: Mapping[str, int] = field(default_factory=dict)  # of the names, the next part's number
     number: int = 0  # of the part that the name is for
+    held: str = ""  # as a part's
 
     @property
     def is_placed(self) -> bool:
@@ -347,7 +355,8 @@ class _Compiler:
             case Repetition() if not shape.opaque:
                 self._combination(Combination(shape.copies()), c, join, blend, k, copies=True)
             case Repetition():  # the values of the copies jump, only that of all together does not
-                self._scope(Combination(shape.copies()), c, opaque=True, copies=True)
+                held = replace(c, held="repetition without end")
+                self._scope(Combination(shape.copies()), held, opaque=True, copies=True)
                 self._join(join, blend, k, shape.lipschitz * c.stretch)
             case _:
                 raise ParameterError(f"shape: a {type(shape).__name__} has no program")
@@ -415,7 +424,7 @@ class _Compiler:
             self._put(*np.linalg.inv(placement)[:3])
         if c.name:
             assert c.before is not None
-            part = Part(c.number, slot, len(self._words), len(self._leaves), c.before, c.matrix, c.factor)
+            part = Part(c.number, slot, len(self._words), len(self._leaves), c.before, c.matrix, c.factor, c.held)
             self._names.setdefault(c.name, []).append(part)
         self._leaves.append(Leaf(slot, shape, placement, c.margin))
         self._word(LEAF, self._kinds.of(shape), join, blend, flags, slot)
@@ -497,11 +506,11 @@ class _Compiler:
         """
         flags = PLACED | (OPAQUE if opaque else 0)
         factor = c.factor
-        slot = self._put(*np.linalg.inv(c.matrix)[:3], (factor, shape.lipschitz * c.stretch, 0, 0))
+        slot = self._put(*np.linalg.inv(c.matrix)[:3], (factor, shape.lipschitz * c.stretch, c.stretch, 0))
         entry = len(self._words)
         self._word(ENTER, AFFINE, flags=flags, slot=slot)
         self._entered()
-        inside = replace(c, matrix=np.eye(4), factor=1.0, stretch=c.stretch / factor, name="", before=None, margin=-1.0)
+        inside = replace(c, matrix=np.eye(4), factor=1.0, stretch=1.0, name="", before=None, margin=-1.0)
         if copies:
             assert isinstance(shape, Combination)
             self._combination(shape, inside, PUSH, HARD, 0.0, copies=True)
@@ -509,7 +518,7 @@ class _Compiler:
             self._emit(shape, inside, PUSH, HARD, 0.0)
         self._places -= 1
         if name:
-            part = Part(number, slot, entry, -1, c.matrix, np.eye(4), factor)
+            part = Part(number, slot, entry, -1, c.matrix, np.eye(4), factor, c.held)
             self._names.setdefault(name, []).append(part)
         self._word(LEAVE, AFFINE, flags=flags, slot=slot)
 
@@ -531,7 +540,8 @@ class _Compiler:
         if shape.warps:
             self._word(ENTER, code, flags=PLACED, slot=slot)
             self._entered()
-        inside = replace(c, stretch=c.stretch * shape.stretch, margin=-1.0)
+        held = shape.code if isinstance(shape, Turning) else c.held
+        inside = replace(c, stretch=c.stretch * shape.stretch, margin=-1.0, held=held)
         self._emit(shape.shape, inside, PUSH, HARD, 0.0)
         if shape.warps:
             self._places -= 1

@@ -31,6 +31,7 @@ from tyndall.sdf.shape import Accuracy, Box, Floats, Modifier, Shape, Vec3, of_s
 
 MOST_COPIES = 4096
 UNCAPPED = 1e30
+LEAST_CAP = 1e-3  # of the spacing, below which a ray would take every place for a surface
 
 
 class Repetition(Shape):
@@ -175,6 +176,11 @@ class RepeatedForever(Repetition):
             low, high = self.shape.box
             reach = f"{_three(low)} to {_three(high)}"
             raise ParameterError(f"spacing: {_three(self.spacing)} is less than the shape reaches from 0: {reach}")
+        if self.cap < LEAST_CAP * max(self.spacing):
+            raise ParameterError(
+                f"spacing: {_three(self.spacing)} leaves no room beyond what the shape reaches; "
+                f"more than {LEAST_CAP:g} of it must be left"
+            )
 
     def _within(self, level: float, cells: float = 1.0) -> bool:
         low, high = self.shape.extent(level)
@@ -259,12 +265,16 @@ def repeat(
 ) -> Repeated | RepeatedForever | MirroredForever:
     """As :meth:`tyndall.sdf.shape.Shape.repeat`."""
     flat = of_shape(shape) == 2
-    x, y, z = (spacing, spacing, 0.0 if flat else spacing) if isinstance(spacing, (int, float)) else _triple(spacing)
+    x, y, z = (
+        (spacing, spacing, 0.0 if flat else spacing)
+        if isinstance(spacing, (int, float, np.number))
+        else _triple(spacing)
+    )
     if count is None:
         return (MirroredForever if mirrored else RepeatedForever)(shape, (x, y, z))
     if mirrored:
         raise ParameterError("mirrored: only without end; leave out the count")
-    i, j, k = (count, count, 1 if flat else count) if isinstance(count, int) else _triple(count)
+    i, j, k = (count, count, 1 if flat else count) if isinstance(count, (int, np.integer)) else _triple(count)
     return Repeated(shape, (x, y, z), (i, j, k))
 
 

@@ -35,7 +35,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -54,6 +54,7 @@ Operation = Literal["union", "intersection", "subtraction"]
 Blend = Literal["polynomial", "exponential", "root"]
 
 NUMBERS = 8  # of a primitive or modifier, as S5 has it
+MOST_DEEP = 240  # nodes within nodes: what walks an expression calls itself, some times a node
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
 
@@ -121,6 +122,11 @@ class Shape:
         """Nodes of the expression, this one and all below."""
         return 1 + sum(child.count for child in self.children)
 
+    @cached_property
+    def depth(self) -> int:
+        """Nodes on the longest way down."""
+        return 1 + max((child.depth for child in self.children), default=0)
+
     # --- combining ---
 
     def __or__(self, other: Shape) -> Shape:
@@ -137,7 +143,10 @@ class Shape:
     def at(self, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Shape:
         """Moved by (x, y, z) metres."""
         matrix = np.eye(4)
-        matrix[:3, 3] = x, y, z
+        try:
+            matrix[:3, 3] = x, y, z
+        except (TypeError, ValueError):
+            raise ParameterError(f"at: {(x, y, z)} are not three numbers") from None
         return self.transform(matrix)
 
     def rotate(self, angle: float, axis: Sequence[float] = Z) -> Shape:
@@ -159,7 +168,10 @@ class Shape:
 
     def scale(self, factor: float | Sequence[float]) -> Shape:
         """Enlarged about 0 by one factor, or by one for each axis; distances stay true under one factor."""
-        factors = np.broadcast_to(np.asarray(factor, np.float64), 3)
+        try:
+            factors = np.broadcast_to(np.asarray(factor, np.float64), 3)
+        except (TypeError, ValueError):
+            raise ParameterError(f"factor: {factor!r} is not one number or three") from None
         return self.transform(np.diag([*factors, 1.0]))
 
     def transform(self, matrix: ArrayLike) -> Shape:
@@ -244,8 +256,9 @@ class Shape:
         """``count`` copies turned about an axis through 0; see :class:`tyndall.sdf.repetition.Polar`."""
         from tyndall.sdf import repetition
 
-        x, y, z = axis
-        return repetition.Polar(self, count, (x, y, z))
+        if len(axis) != 3:
+            raise ParameterError(f"axis: {axis} is no direction")
+        return repetition.Polar(self, count, (axis[0], axis[1], axis[2]))
 
     def moved(self, moves: Mapping[str, Iterator[Floats]]) -> Shape:
         """The same with its named parts moved from where they stand, in the space that holds them.
@@ -259,9 +272,21 @@ class Shape:
         made = [child.moved(moves) for child in self.children]
         shape: Shape = self
         if any(new is not old for new, old in zip(made, self.children, strict=True)):
-            changed = {"shapes": tuple(made)} if isinstance(self, Combination) else {"shape": made[0]}
-            shape = replace(self, **changed)  # type: ignore[type-var]
+            shape = replace(self, **_with_children(self, made))  # type: ignore[type-var]
         return shape if step is None else shape.transform(step)
+
+    def edited(self, name: str, changes: Mapping[str, Any]) -> Shape:
+        """The same with other parameters of the primitives of a name."""
+        return self._edited(name, changes, False)
+
+    def _edited(self, name: str, changes: Mapping[str, Any], inside: bool) -> Shape:
+        if not self.children:
+            return replace(self, **changes) if inside else self  # type: ignore[type-var]
+        within = inside or (isinstance(self, Named) and self.name == name)
+        made = [child._edited(name, changes, within) for child in self.children]
+        if all(new is old for new, old in zip(made, self.children, strict=True)):
+            return self
+        return replace(self, **_with_children(self, made))  # type: ignore[type-var]
 
     # --- showing ---
 
@@ -316,6 +341,11 @@ class Shape:
         return Named(self, name)
 
 
+def _with_children(shape: Shape, children: Sequence[Shape]) -> dict[str, Any]:
+    """What :func:`~dataclasses.replace` gives a node to have these children."""
+    return {"shapes": tuple(children)} if isinstance(shape, Combination) else {"shape": children[0]}
+
+
 def _modified(kind: str, *arguments: Any) -> Shape:
     """A node of a module that imports this one."""
     from tyndall.sdf import modifiers
@@ -338,13 +368,15 @@ def rotation(angle: float, axis: Sequence[float]) -> Floats:
 
 
 def of_shape(shape: Any) -> int:
-    """The dimension of what must be a shape.
+    """The dimension of what must be a shape that a node can have below it.
 
     Raises:
-        ParameterError: it is something else.
+        ParameterError: it is something else, or too deep.
     """
     if not isinstance(shape, Shape):
         raise ParameterError(f"shape: {shape!r} is no shape")
+    if shape.depth >= MOST_DEEP:
+        raise ParameterError(f"shape: nodes within nodes, more than {MOST_DEEP}; union(a, b, c, …) takes many at once")
     return shape.dimension
 
 
@@ -497,12 +529,15 @@ class Combination(Shape):
 
     def __post_init__(self) -> None:
         check(self)
+        if self.operation not in (known := get_args(Operation)):
+            raise ParameterError(f"operation: {self.operation!r} is not one of {', '.join(map(repr, known))}")
         object.__setattr__(self, "shapes", tuple(self.shapes))
         if not self.shapes:
             raise ParameterError("shapes: none are given")
         for i, shape in enumerate(self.shapes):
             if not isinstance(shape, Shape):
                 raise ParameterError(f"shapes[{i}]: {shape!r} is no shape")
+            of_shape(shape)
         if len({shape.dimension for shape in self.shapes}) > 1:
             raise ParameterError("shapes: some are flat and some solid; extrude or revolve the flat ones first")
         object.__setattr__(self, "dimension", self.shapes[0].dimension)
@@ -582,6 +617,8 @@ def intersection(*shapes: Shape, smooth: float = 0.0, blend: Blend = "polynomial
 
 def subtraction(shape: Shape, *others: Shape, smooth: float = 0.0, blend: Blend = "polynomial") -> Shape:
     """The first without the others; see :class:`Combination`."""
+    if smooth == 0 and isinstance(shape, Combination) and shape.operation == "subtraction" and shape.smooth == 0:
+        return Combination((*shape.shapes, *others), "subtraction", smooth, blend)
     return Combination((shape, *others), "subtraction", smooth, blend)
 
 
@@ -605,6 +642,8 @@ class Transformed(Shape):
         m = self.placement
         if m.shape != (4, 4) or not np.isfinite(m).all() or np.linalg.svd(m[:3, :3], compute_uv=False)[-1] <= 1e-12:
             raise ParameterError("matrix: not finite numbers that have an inverse")
+        if not np.array_equal(m[3], (0, 0, 0, 1)):
+            raise ParameterError(f"matrix: its last row is {tuple(m[3].tolist())}, and an affine one's is 0, 0, 0, 1")
         object.__setattr__(self, "dimension", of_shape(self.shape))
         if self.dimension == 2 and (m[2, :2].any() or m[:2, 2].any()):
             raise ParameterError("matrix: it turns a flat shape out of its plane; extrude or revolve it first")
@@ -662,6 +701,8 @@ class Painted(Shape):
     surface: Material
 
     def __post_init__(self) -> None:
+        if not isinstance(self.surface, Material):
+            raise ParameterError(f"material: {self.surface!r} is no Material")
         object.__setattr__(self, "dimension", of_shape(self.shape))
 
     @property
@@ -691,6 +732,8 @@ class Named(Shape):
     name: str
 
     def __post_init__(self) -> None:
+        if not isinstance(self.name, str):
+            raise ParameterError(f"name: {self.name!r} is no name")
         object.__setattr__(self, "dimension", of_shape(self.shape))
 
     @property

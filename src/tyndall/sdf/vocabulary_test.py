@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Callable
 
 import numpy as np
 import props
@@ -21,8 +22,9 @@ from tyndall.scene.model import Implicit, Material
 from tyndall.sdf import X, Y, Z
 from tyndall.sdf.modifiers import Bend, Displace, Elongate, Extrude, Mirror, Noise, Revolve, Round, Shell, Twist
 from tyndall.sdf.profiles import PROFILES
+from tyndall.sdf.program import Kinds, compile_shape
 from tyndall.sdf.repetition import Cell, MirroredForever, Polar, Repeated, RepeatedForever, Repetition
-from tyndall.sdf.shape import Combination, Floats, Modifier, Named, Painted, Primitive, Shape, Transformed
+from tyndall.sdf.shape import MOST_DEEP, Combination, Floats, Modifier, Named, Painted, Primitive, Shape, Transformed
 from tyndall.sdf.solids import SOLIDS
 
 MODIFIERS = (
@@ -545,3 +547,47 @@ def test_a_mistake_is_told_in_one_line(text: str) -> None:
 def test_a_flat_shape_is_no_object() -> None:
     with pytest.raises(ParameterError, match="Circle is no solid shape"):
         Implicit(sdf.circle())
+
+
+# --- what is no shape -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: sdf.sphere(1).at("x"), "at: .* are not three numbers"),
+        (lambda: sdf.sphere(1).scale((1, 2, 3, 4)), "factor: .* is not one number or three"),
+        (
+            lambda: sdf.sphere(1).transform([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 1, 1]]),
+            "matrix: its last row",
+        ),
+        (lambda: sdf.sphere(1).polar(3, (1, 2)), "axis: .* is no direction"),
+        (lambda: sdf.sphere(1).named(5), "name: 5 is no name"),
+        (lambda: sdf.sphere(1).material("red"), "material: 'red' is no Material"),
+        (lambda: Combination((sdf.sphere(1),), "xor"), "operation: 'xor' is not one of 'union'"),
+        (lambda: sdf.sphere(1).repeat(1.0), "spacing: .* leaves no room"),
+    ],
+)
+def test_what_is_refused(make: Callable[[], Shape], message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
+        make()
+
+
+def test_numbers_may_be_of_numpy() -> None:
+    assert sdf.sphere(0.1).repeat(np.float32(0.5), np.int64(2)).count == 2
+
+
+def test_many_cuts_one_after_the_other_are_one_node() -> None:
+    shape = sdf.box(1)
+    for i in range(1000):
+        shape = shape - sdf.sphere(0.1).at(0.01 * i)
+    assert shape.depth == 3
+    assert shape([[0.05, 0, 0]])[0] == pytest.approx(0.1)
+    while shape.depth < MOST_DEEP:
+        shape = sdf.union(shape, sdf.sphere(0.1), smooth=0.1)
+    with pytest.raises(ParameterError, match="nodes within nodes"):
+        sdf.union(shape, sdf.sphere(0.1), smooth=0.1)
+    assert shape.lipschitz == 1
+    assert np.isfinite(shape.box).all()
+    assert np.isfinite(shape([[0, 0, 0]])).all()
+    assert compile_shape(shape, Kinds()).size > 1000

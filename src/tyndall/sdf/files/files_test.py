@@ -641,3 +641,14 @@ def test_the_examples_of_the_docs_are_right(tmp_path: Path) -> None:
     paths = [write(tmp_path, block, f"{i}.json") for i, block in enumerate(blocks)]
     made = [load(path) for path in paths]
     assert [type(thing) for thing in made] == [SnippetKind, FragmentShader, ShadedMaterial, Painted, Scene]
+
+
+def test_a_scene_that_could_not_be_read_again_is_not_written(tmp_path: Path) -> None:
+    """Scene files may be nested less deeply than models' own."""
+    shape = sdf.sphere(1)
+    while shape.depth < 200:
+        shape = shape.round(1e-3)
+    with pytest.raises((ParameterError, SceneError), match="nested too deeply for a scene file"):
+        tyndall.save(Scene(implicits=(Implicit(shape),)), tmp_path / "scene.json")
+    sdf.save(shape, tmp_path / "model.json")
+    assert sdf.load(tmp_path / "model.json") == shape

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,7 @@ from tyndall.sdf.shading import FragmentShader, ShadedMaterial
 from tyndall.sdf.shape import Combination, Named, Painted, Primitive, Shape, Transformed
 from tyndall.sdf.snippets import Snippet, SnippetSource
 
+MOST_LEVELS = 190  # of lists and objects within each other: readers of scene files give up at 200
 _ON_ONE_LINE = {"x", "y", "z", "name", "type", "value", "data"}
 
 
@@ -56,7 +57,21 @@ def pack_objects(implicits: Sequence[Implicit]) -> dict[str, Any]:
             )
     except RecursionError:
         raise ParameterError("implicits: a shape is nested too deeply") from None
+    if _levels(objects) > MOST_LEVELS:
+        raise ParameterError("implicits: a shape is nested too deeply for a scene file; sdf.save() writes it alone")
     return {**writer.tables(), "objects": objects}
+
+
+def _levels(value: Any) -> int:
+    """How deep lists and objects lie within each other."""
+    levels, within = 0, [value]
+    while within := [inner for outer in within for inner in _inside(outer)]:
+        levels += 1
+    return levels
+
+
+def _inside(value: Any) -> Collection[Any]:
+    return value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
 
 
 class _Writer:
