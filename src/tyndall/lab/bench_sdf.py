@@ -66,7 +66,7 @@ FRAME: Mapping[str, str] = {
 }
 # As the plain loop does it: one ray to each light, values along the normal.
 CHANGES: Mapping[str, Mapping[str, Any]] = {"field": {"cones": 1}, "field_ao": {"cones": 1}}
-BATCH = 8  # frames between two waits, where frames per second are counted
+BATCH = 32  # frames between two waits, where frames per second are counted
 STEP = 1 / 60  # s of a scene's own time from frame to frame
 _MOST_LITERAL = 2000  # primitives; a compiler has no end with more
 

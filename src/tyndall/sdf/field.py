@@ -46,7 +46,7 @@ _PRUNE = "package::sdf::prune"
 _MARGIN = 0.02  # of its longest side, around an object's box
 _DIVIDED = 4  # a program of more instructions has cells
 _COARSE, _FINE = 16, 64  # cells along the longest side, of both levels
-_SPARE = 0.1  # of its longest side, by which an object's box grows beyond what it must hold
+_SPARE = 0.04  # of its longest side, by which an object's box grows beyond what it must hold
 _LEAF_SLOTS = 7  # of a leaf with a name
 _COUNTERS = 8  # of an object: entries used, overflows, words of marks used at each level
 _LEAST_ENTRIES, _MOST_ENTRIES = 1 << 12, 1 << 23
@@ -490,7 +490,8 @@ class Field(Closing):
     def _hull(self, made: _Object) -> Box:
         """The box of all leaves, where nothing but unions is above them."""
         if made.halves is None:
-            boxes = np.array([leaf.shape.extent(leaf.margin / factor) for leaf, factor in made.leaves()])
+            # A smooth union takes at most a quarter of its width, of which margins count all.
+            boxes = np.array([leaf.shape.extent(0.25 * leaf.margin / factor) for leaf, factor in made.leaves()])
             made.halves = 0.5 * (boxes[:, 1] - boxes[:, 0])
             made.middles = 0.5 * (boxes[:, 1] + boxes[:, 0])
         linear = made.placements[:, :3, :3]
@@ -552,6 +553,7 @@ class Field(Closing):
                 job["is_root"] = level == 0
                 first, end = blocks * part // parts, blocks * (part + 1) // parts
                 job["first_block"], job["block_count"] = first, end - first
+                job["is_last"] = self._is_long(made) and level == made.levels - 1 and part == parts - 1
                 job["first_entry"], job["capacity"] = made.first_entry, made.capacity
                 job["counters"] = _COUNTERS * index
                 job["marks_capacity"] = self._marks_capacity
@@ -615,6 +617,8 @@ class Field(Closing):
                 self._pass("emit_alive", here).dispatch_line(64 * int(np.prod(job["counts"])))
                 continue
             self._pass("prune", here).dispatch_line(64 * int(job["block_count"]))
+            if job["is_last"]:
+                self._pass("refine", here).dispatch_line(int(np.prod(job["counts"])))
 
     def _pass(self, entry: str, scope: Mapping[str, Any]) -> ComputePass:
         shared = self._gpu.adapter_info["adapter_type"] != "CPU"  # see prune.wesl

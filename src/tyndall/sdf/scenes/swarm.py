@@ -24,7 +24,7 @@ from tyndall.sdf.solids import plane, rounded_box, sphere
 COUNT = 1000
 SUN = (-0.5, -0.72, -0.48)
 KNOT = 0.62  # m, of the knot's unit
-THICK = 0.34  # m, how far from the knot's line
+THICK = 0.4  # m, how far from the knot's line
 VOLUME = 5.5  # m³, about, of what is that near
 WAVE = 0.16  # m, how far each moves
 HEIGHT = 1.45  # m, of the knot's middle above the floor
@@ -116,7 +116,7 @@ def _swarm(count: int, seed: int) -> tuple[Shape, Floats]:
         color = COLORS[int(len(COLORS) * u[i] / (2 * math.pi) + shades[i]) % len(COLORS)]
         x, y, z = (float(v) for v in places[i])
         grains.append(_grain(float(kinds[i]), float(sizes[i])).named("swarm").at(x, y, z).material(color))
-    return union(*grains, smooth=0.35 * mean), places[order]
+    return union(*grains, smooth=0.15 * mean), places[order]
 
 
 def swarm(count: int = COUNT, lights: int = 1, seed: int = 0) -> Scene:
