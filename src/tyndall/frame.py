@@ -447,7 +447,7 @@ class Renderer(Closing):
             ParameterError: no such name, or what are no transforms.
         """
         objects = self._objects(name)
-        given = np.asarray(moves, np.float64)
+        given = moves if isinstance(moves, np.ndarray) else np.empty(0)
         if objects or given.shape[1:] != (3,):  # ways of parts are written as they are
             given = transforms(name, moves)
         if len(given) < len(objects):

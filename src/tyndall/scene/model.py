@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, ClassVar, Literal, Protocol, get_args
@@ -544,6 +544,9 @@ class Scene:
         check(self)
         if self.room is not None and not all(a <= b for a, b in zip(*self.room, strict=True)):
             raise ParameterError(f"room: the upper corner {self.room[1]} is below the lower {self.room[0]}")
+        for name in ("instances", "lights", "implicits", "volumes"):
+            if not isinstance(getattr(self, name), Iterable):
+                raise ParameterError(f"{name}: {type(getattr(self, name)).__name__} is no list of them")
         object.__setattr__(self, "instances", tuple(self.instances))
         object.__setattr__(self, "lights", tuple(self.lights))
         object.__setattr__(self, "implicits", tuple(self.implicits))
@@ -627,6 +630,8 @@ def transforms(name: str, value: ArrayLike) -> NDArray[np.float64]:
     except (TypeError, ValueError):
         raise ParameterError(f"{name}: {value!r:.60} is neither transforms nor ways") from None
     if given.shape[-2:] == (4, 4) and given.ndim in (2, 3):
+        if not (given[..., 3, :] == (0, 0, 0, 1)).all():
+            raise ParameterError(f"{name}: the last row of a transform is not 0, 0, 0, 1")
         return given.reshape(-1, 4, 4)
     if given.ndim == 2 and given.shape[1] == 3:
         made = np.tile(np.eye(4), (len(given), 1, 1))

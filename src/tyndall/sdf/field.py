@@ -47,6 +47,7 @@ _MARGIN = 0.02  # of its longest side, around an object's box
 _DIVIDED = 4  # a program of more instructions has cells
 _COARSE, _FINE = 16, 64  # cells along the longest side, of both levels
 _SPARE = 0.04  # of its longest side, by which an object's box grows beyond what it must hold
+_ROOMY = 1.5  # times what an object's longest side must hold, from where on it shrinks
 _LEAF_SLOTS = 7  # of a leaf with a name
 _COUNTERS = 8  # of an object: entries used, overflows, words of marks used at each level
 _LEAST_ENTRIES, _MOST_ENTRIES = 1 << 12, 1 << 23
@@ -480,7 +481,9 @@ class Field(Closing):
                 box = made.shape.moved({name: iter(given) for name, given in moves.items()}).box
         low, high = box
         if (low >= made.box[0]).all() and (high <= made.box[1]).all():
-            return
+            if np.max(made.box[1] - made.box[0]) <= _ROOMY * np.max(high - low):
+                return
+            made.box = low, high  # a part is back from afar, and cells are best small
         spare = _SPARE * np.max(np.maximum(high, made.box[1]) - np.minimum(low, made.box[0]))
         lower = np.where(low < made.box[0], low - spare, made.box[0])
         upper = np.where(high > made.box[1], high + spare, made.box[1])
@@ -648,7 +651,9 @@ class Field(Closing):
         return [*self._buffers, *([self._params] if self._params else [])]
 
     def close(self) -> None:
-        """Free all device memory."""
+        """Free all device memory, once what was recorded has been submitted."""
+        if self._gpu.recording:
+            self._gpu.submit()
         for resource in self.resources():
             resource.destroy()
         self._buffers.clear()
