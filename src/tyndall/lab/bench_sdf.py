@@ -341,6 +341,8 @@ class _Run:
 
     def _measured(self, renderer: Renderer, drawn: Any) -> Row:
         gpu, s = self._gpu, self._s
+        drawn.draw()  # compiles; that must not be of the time for measuring
+        gpu.wait()
         with Busy(gpu) as busy:
             taken = measure(drawn, frames=s.frames, warmup=s.warmup, budget_s=s.seconds, before=busy)
         fps = frames_per_second(drawn.draw, gpu.wait, min(s.seconds, 3.0), s.frames)
