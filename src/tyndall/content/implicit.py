@@ -16,7 +16,7 @@ For shadows on planes, one pass marches from each pixel of a plane towards all l
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -29,10 +29,11 @@ from tyndall.content.rasterize import Triangles
 from tyndall.gpu.device import Gpu, Raster
 from tyndall.gpu.resources import Bound, Buffer, Resource, Texture
 from tyndall.scene.model import Implicit, Material, Scene
+from tyndall.sdf import paint
 from tyndall.sdf.field import Field
 from tyndall.sdf.marching import Marching
 from tyndall.sdf.shading import shines
-from tyndall.sdf.shape import Named, Painted, Shape
+from tyndall.sdf.shape import Named
 
 MODULE = "package::content::implicit"
 OWNER = "implicit"
@@ -61,7 +62,9 @@ class Fields:
         self._maps: dict[int, Texture] = {}
         self._shade: Texture | None = None
         self.emits = any(shines(material) for one in scene.implicits for material in materials_of(one))
-        self.parts = {node.name for one in scene.implicits for node in nodes_of(one.shape) if isinstance(node, Named)}
+        self.parts = {
+            node.name for one in scene.implicits for node in paint.nodes_of(one.shape) if isinstance(node, Named)
+        }
         self.field = Field(gpu, scene.implicits, marching=marching)
         try:
             for name, format in (("depth", "r32float"), ("ids", "r32uint")):
@@ -253,16 +256,6 @@ class Fields:
         self.field.close()
 
 
-def materials_of(implicit: Implicit) -> Iterator[Material]:
+def materials_of(implicit: Implicit) -> list[Material]:
     """The materials of an implicit surface: its own, and those of its parts."""
-    yield implicit.material
-    yield from (node.surface for node in nodes_of(implicit.shape) if isinstance(node, Painted))
-
-
-def nodes_of(shape: Any) -> Iterator[Shape]:
-    """The nodes of a shape, in no order that matters."""
-    waiting: list[Shape] = [shape]
-    while waiting:
-        node = waiting.pop()
-        yield node
-        waiting.extend(node.children)
+    return [implicit.material, *paint.materials_of(implicit.shape)]

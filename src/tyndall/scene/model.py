@@ -619,6 +619,13 @@ class Scene:
         return self.with_(implicits=tuple(moved), motion=None)
 
 
+def translations(ways: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(N, 4, 4) transforms that move by (N, 3) ways in metres."""
+    made = np.tile(np.eye(4), (len(ways), 1, 1))
+    made[:, :3, 3] = ways
+    return made
+
+
 def transforms(name: str, value: ArrayLike) -> NDArray[np.float64]:
     """(N, 4, 4) from one 4×4 transform, N of them, or (N, 3) ways in metres.
 
@@ -634,7 +641,5 @@ def transforms(name: str, value: ArrayLike) -> NDArray[np.float64]:
             raise ParameterError(f"{name}: the last row of a transform is not 0, 0, 0, 1")
         return given.reshape(-1, 4, 4)
     if given.ndim == 2 and given.shape[1] == 3:
-        made = np.tile(np.eye(4), (len(given), 1, 1))
-        made[:, :3, 3] = given
-        return made
+        return translations(given)
     raise ParameterError(f"{name}: shape {given.shape} is neither of 4×4 transforms nor (count, 3) of ways")

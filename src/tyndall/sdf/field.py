@@ -30,7 +30,7 @@ from numpy.typing import ArrayLike, NDArray
 from tyndall.gpu.device import ComputePass, Gpu, GpuError
 from tyndall.gpu.params import ParameterError, nearest
 from tyndall.gpu.resources import Buffer, Closing, ParamsBuffer, Resource
-from tyndall.scene.model import Implicit, Material
+from tyndall.scene.model import Implicit, Material, translations
 from tyndall.sdf.hull import Hull
 from tyndall.sdf.marching import Marching
 from tyndall.sdf.program import TURNED, Kinds, Leaf, Part, Program, compile_shape
@@ -103,11 +103,7 @@ class _Parts:
 
 def _matrices(given: Floats) -> Floats:
     """(N, 4, 4) of transforms, or of (N, 3) ways."""
-    if given.ndim == 3:
-        return given
-    made = np.tile(np.eye(4), (len(given), 1, 1))
-    made[:, :3, 3] = given
-    return made
+    return given if given.ndim == 3 else translations(given)
 
 
 def _least_stretches(linear: Floats) -> Floats:

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tyndall.gpu.params import ParameterError
-from tyndall.scene.model import Material
+from tyndall.scene.model import Material, translations
 from tyndall.sdf.shape import Blend, Combination, Floats, Named, Painted, Primitive, Shape, Transformed
 
 FEWEST = 65  # leaves of a union that is listed where nobody says otherwise; fewer are better as code
@@ -184,9 +184,7 @@ def as_matrices(given: ArrayLike, count: int) -> Floats:
         return np.broadcast_to(value, (count, 4, 4))
     if value.shape not in ((count, 3), (3,)):
         raise ParameterError(f"moves: shape {value.shape} is not (4, 4), ({count}, 4, 4) or ({count}, 3)")
-    matrices = np.tile(np.eye(4), (count, 1, 1))
-    matrices[:, :3, 3] = value
-    return matrices
+    return translations(np.broadcast_to(value, (count, 3)))
 
 
 class _OtherKindError(Exception):

@@ -31,7 +31,7 @@ _BORROWED = -1  # of a cut: the material of what is cut
 
 def materials_of(shape: Solid) -> list[Material]:
     """All materials that parts of a shape have of their own."""
-    return list({id(node.surface): node.surface for node in _nodes(shape) if isinstance(node, Painted)}.values())
+    return list({id(node.surface): node.surface for node in nodes_of(shape) if isinstance(node, Painted)}.values())
 
 
 def painted(shape: Shape, points: ArrayLike, default: Material) -> tuple[list[Material], Numbers]:
@@ -62,7 +62,7 @@ class _Brush:
         while isinstance(shape, Painted):
             inherited = self.numbers[id(shape.surface)]
             shape = shape.shape
-        if not any(isinstance(node, Painted) for node in _nodes(shape)):
+        if not any(isinstance(node, Painted) for node in nodes_of(shape)):
             return shape.distance(p), np.full(len(p), inherited)
         match shape:
             case Combination():
@@ -98,7 +98,7 @@ class _Brush:
         return which
 
 
-def _nodes(shape: Solid) -> Iterator[Solid]:
+def nodes_of(shape: Solid) -> Iterator[Solid]:
     waiting = [shape]
     while waiting:
         node = waiting.pop()

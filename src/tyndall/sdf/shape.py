@@ -693,8 +693,32 @@ def transformed_box(box: Box, matrix: Floats) -> Box:
     return low + matrix[:3, 3], high + matrix[:3, 3]
 
 
+class Marked(Shape):
+    """One child that something more is known of; its values are the child's own."""
+
+    shape: Shape
+
+    @property
+    def children(self) -> tuple[Shape, ...]:
+        return (self.shape,)
+
+    def distance(self, p: Floats) -> Floats:
+        return self.shape.distance(p)
+
+    @cached_property
+    def lipschitz(self) -> float:
+        return self.shape.lipschitz
+
+    def extent(self, level: float) -> Box:
+        return self.shape.extent(level)
+
+    @cached_property
+    def accuracy(self) -> Accuracy:
+        return self.shape.accuracy
+
+
 @dataclass(frozen=True)
-class Painted(Shape):
+class Painted(Marked):
     """One child with a material wherever a part has none of its own."""
 
     shape: Shape
@@ -705,27 +729,9 @@ class Painted(Shape):
             raise ParameterError(f"material: {self.surface!r} is no Material")
         object.__setattr__(self, "dimension", of_shape(self.shape))
 
-    @property
-    def children(self) -> tuple[Shape, ...]:
-        return (self.shape,)
-
-    def distance(self, p: Floats) -> Floats:
-        return self.shape.distance(p)
-
-    @cached_property
-    def lipschitz(self) -> float:
-        return self.shape.lipschitz
-
-    def extent(self, level: float) -> Box:
-        return self.shape.extent(level)
-
-    @cached_property
-    def accuracy(self) -> Accuracy:
-        return self.shape.accuracy
-
 
 @dataclass(frozen=True)
-class Named(Shape):
+class Named(Marked):
     """One child that can be moved by its name."""
 
     shape: Shape
@@ -735,21 +741,3 @@ class Named(Shape):
         if not isinstance(self.name, str):
             raise ParameterError(f"name: {self.name!r} is no name")
         object.__setattr__(self, "dimension", of_shape(self.shape))
-
-    @property
-    def children(self) -> tuple[Shape, ...]:
-        return (self.shape,)
-
-    def distance(self, p: Floats) -> Floats:
-        return self.shape.distance(p)
-
-    @cached_property
-    def lipschitz(self) -> float:
-        return self.shape.lipschitz
-
-    def extent(self, level: float) -> Box:
-        return self.shape.extent(level)
-
-    @cached_property
-    def accuracy(self) -> Accuracy:
-        return self.shape.accuracy
