@@ -26,6 +26,7 @@ import numpy as np
 import wgpu
 from numpy.typing import NDArray
 
+from tyndall.gpu import driver_types
 from tyndall.gpu import params as declared
 from tyndall.gpu.resources import (
     BYTES_PER_TEXEL,
@@ -83,6 +84,7 @@ def adapters() -> list[wgpu.GPUAdapter]:
     if lacking:
         os.environ["XDG_RUNTIME_DIR"] = tempfile.gettempdir()
     try:
+        driver_types.look_up()
         found = [a for a in wgpu.gpu.enumerate_adapters_sync() if a.info["backend_type"] in _BACKENDS]
     finally:
         if lacking:
