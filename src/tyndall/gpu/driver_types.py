@@ -19,10 +19,10 @@ def look_up(ffi: Any = None) -> bool:
     Whether it could: this reaches into what cffi does not promise. Without it everything is the same, and later.
     """
     try:
-        from cffi import model
+        from cffi import model  # type: ignore[import-untyped]
+        from wgpu.backends import wgpu_native
 
-        if ffi is None:
-            from wgpu.backends.wgpu_native import ffi
+        ffi = ffi or wgpu_native.ffi
         parser = ffi._parser
         parse, known, pointer_to = parser.parse_type, parser._declarations, parser._get_type_pointer
         primitives, array_of = model.PrimitiveType.ALL_PRIMITIVE_TYPES, model.ArrayType
