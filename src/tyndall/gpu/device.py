@@ -65,6 +65,7 @@ _LIMITS = (
 _RANK_TYPE = {"DiscreteGPU": 0, "IntegratedGPU": 1, "VirtualGPU": 2, "Unknown": 3, "CPU": 4}
 _BACKENDS = ("Vulkan", "Metal", "D3D12")
 _MAX_TIMED_PASSES = 2048
+_MOST_PREPARED = 1024
 _UPLOAD_CHUNK = 64 << 20
 LINE = 32_768  # workgroups in a row of a one-dimensional dispatch
 
@@ -223,6 +224,7 @@ class Gpu(Closing):
         self.part_bytes: int = self.limits["max-storage-buffer-binding-size"]
         self.linker = Linker.of_package()
         self._programs: dict[Any, _Program] = {}
+        self._prepared: dict[Any, Any] = {}  # passes and pipelines with their groups, by all that they were made of
         self._modules: dict[Any, tuple[Linked, Any]] = {}
         self._samplers: dict[Any, Sampler] = {}
         self._constants: dict[int, Buffer] = {}
@@ -545,8 +547,12 @@ class Gpu(Closing):
         """(pipeline, bind group) for drawing; record them into a render pass or a bundle."""
         bound = _all_bound(bindings)
         entries = (vertex,) if fragment is None else (vertex, fragment)
-        program = self._program(module, entries, bound, overlay or {}, features or {}, state)
-        return program.pipeline, self._group(program, bound)
+        key = _key(module, entries, bound, overlay or {}, features or {}, state)
+        made: tuple[Any, Any] | None = self._prepared.get(key)
+        if made is None:
+            program = self._program(module, entries, bound, overlay or {}, features or {}, state)
+            made = self._prepare(key, (program.pipeline, self._group(program, bound)))
+        return made
 
     def bundle(self, label: str, state: Raster, *, depth_read_only: bool = False) -> Any:
         """A render bundle encoder for passes with the formats of ``state``: recorded once, replayed at no cost."""
@@ -677,8 +683,16 @@ class Gpu(Closing):
             )
         return group
 
+    def _prepare[T](self, key: Any, made: T) -> T:
+        """Keep what a pass of the next frame looks up whole, without asking for its program and its group apart."""
+        if len(self._prepared) >= _MOST_PREPARED:
+            self._prepared.clear()
+        self._prepared[key] = made
+        return made
+
     def forget_groups(self) -> None:
         """Drop cached bind groups, so that destroyed resources are not kept alive by them."""
+        self._prepared.clear()
         for program in self._programs.values():
             program.groups.clear()
 
@@ -690,6 +704,7 @@ class Gpu(Closing):
         for buffer in self._constants.values():
             buffer.destroy()
         self._constants.clear()
+        self._prepared.clear()
         self._programs.clear()
         self._samplers.clear()
         if self._timed:
@@ -713,7 +728,10 @@ class ComputePass:
         """Give names to resources: a :class:`Bound`, :class:`Parts`, or a texture (sampled), buffer (read) or
         parameter buffer.
         """
-        self._bound.update(_all_bound({**(scope or {}), **resources}))
+        if scope:
+            self._bound.update(_all_bound(scope))
+        if resources:
+            self._bound.update(_all_bound(resources))
         return self
 
     def overlay(self, modules: Mapping[str, str]) -> Self:
@@ -740,10 +758,15 @@ class ComputePass:
 
     def prepare(self) -> Prepared:
         """The same pass, to be run many times at little cost."""
-        gpu = self._gpu
-        program = gpu._program(self._module, (self._entry,), self._bound, self._overlay, self._features, None)
-        group = gpu._group(program, self._bound)
-        return Prepared(gpu, self._label, program.pipeline, group, gpu.linker.workgroup(self._module, self._entry))
+        gpu, entries = self._gpu, (self._entry,)
+        key = _key(self._module, entries, self._bound, self._overlay, self._features, self._label)
+        made: Prepared | None = gpu._prepared.get(key)
+        if made is None:
+            program = gpu._program(self._module, entries, self._bound, self._overlay, self._features, None)
+            group = gpu._group(program, self._bound)
+            workgroup = gpu.linker.workgroup(self._module, self._entry)
+            made = gpu._prepare(key, Prepared(gpu, self._label, program.pipeline, group, workgroup))
+        return made
 
 
 @dataclass(frozen=True)
@@ -763,16 +786,17 @@ class Prepared:
 
     def run(self, x: int, y: int = 1, z: int = 1) -> None:
         """Run that many workgroups: in a pass of its own, or as part of the chain that is open."""
-        with self._pass() as native:
-            native.dispatch_workgroups(x, y, z)
+        native = self._begin()
+        native.dispatch_workgroups(x, y, z)
+        self._end(native)
 
     def run_indirect(self, arguments: Buffer, offset: int = 0) -> None:
         """As :meth:`run`, of the three numbers of workgroups that stand in a buffer at a byte offset."""
-        with self._pass() as native:
-            native.dispatch_workgroups_indirect(arguments.native, offset)
+        native = self._begin()
+        native.dispatch_workgroups_indirect(arguments.native, offset)
+        self._end(native)
 
-    @contextlib.contextmanager
-    def _pass(self) -> Iterator[Any]:
+    def _begin(self) -> Any:
         gpu = self.gpu
         native = gpu._chain
         if native is None:
@@ -781,12 +805,28 @@ class Prepared:
             native = encoder.begin_compute_pass(label=self.label, **({"timestamp_writes": stamps} if stamps else {}))
         native.set_pipeline(self.pipeline)
         native.set_bind_group(0, self.group)
-        yield native
-        if gpu._chain is None:
+        return native
+
+    def _end(self, native: Any) -> None:
+        if self.gpu._chain is None:
             native.end()
 
 
-def _all_bound(resources: Mapping[str, Any]) -> dict[str, Bound]:
+def _key(
+    module: str,
+    entries: tuple[str, ...],
+    bound: Mapping[str, Bound],
+    overlay: Mapping[str, str],
+    features: Mapping[str, bool],
+    more: Any,
+) -> tuple[Any, ...]:
+    """What a pass is known by: bindings by their names and by what they are themselves, which the key keeps alive."""
+    return (module, entries, more, *bound, *bound.values(), *overlay.items(), *features.items())
+
+
+def _all_bound(resources: Mapping[str, Any]) -> Mapping[str, Bound]:
+    if set(map(type, resources.values())) == {Bound}:  # as it is in most passes
+        return resources
     bound: dict[str, Bound] = {}
     for name, value in resources.items():
         if type(value) is Bound:
