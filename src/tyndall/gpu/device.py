@@ -70,6 +70,7 @@ _LIMITS = (
 _RANK_TYPE = {"DiscreteGPU": 0, "IntegratedGPU": 1, "VirtualGPU": 2, "Unknown": 3, "CPU": 4}
 _BACKENDS = ("Vulkan", "Metal", "D3D12")
 _MAX_TIMED_PASSES = 2048
+_MOST_PREPARED = 1024
 _UPLOAD_CHUNK = 64 << 20
 LINE = 32_768  # workgroups in a row of a one-dimensional dispatch
 
@@ -195,7 +196,7 @@ class Raster:
 
 
 # All that a pipeline is built from: module, entry points, names and slots of what is bound, overlay, features, state.
-_Key = tuple[
+_ProgramKey = tuple[
     str,
     tuple[str, ...],
     tuple[str, ...],
@@ -206,14 +207,14 @@ _Key = tuple[
 ]
 
 
-def _key(
+def _program_key(
     module: str,
     entries: tuple[str, ...],
     bound: Mapping[str, Bound],
     overlay: Mapping[str, str],
     features: Mapping[str, bool],
     state: Raster | None,
-) -> _Key:
+) -> _ProgramKey:
     slots = tuple(b.slot for b in bound.values())
     return module, entries, tuple(bound), slots, tuple(overlay.items()), tuple(features.items()), state
 
@@ -281,9 +282,10 @@ class Gpu(Closing):
         self.part_bytes: int = self.limits["max-storage-buffer-binding-size"]
         self.linker = Linker.of_package()
         self.built: list[Built] = []
-        self._programs: dict[_Key, _Program | Future[_Program]] = {}
+        self._programs: dict[_ProgramKey, _Program | Future[_Program]] = {}
         self._builders: ThreadPoolExecutor | None = None
         self._kept: list[Callable[[], object]] | None = None  # inside `together`: what waits for a pipeline, in order
+        self._prepared: dict[Any, Any] = {}  # passes and pipelines with their groups, by all that they were made of
         self._samplers: dict[Any, Sampler] = {}
         self._constants: dict[int, Buffer] = {}
         self._encoder: Any = None
@@ -660,8 +662,12 @@ class Gpu(Closing):
         """(pipeline, bind group) for drawing; record them into a render pass or a bundle."""
         bound = _all_bound(bindings)
         entries = (vertex,) if fragment is None else (vertex, fragment)
-        program = self._program(_key(module, entries, bound, overlay or {}, features or {}, state))
-        return program.pipeline, self._group(program, bound)
+        key = _key(module, entries, bound, overlay or {}, features or {}, state)
+        made: tuple[Any, Any] | None = self._prepared.get(key)
+        if made is None:
+            program = self._program(_program_key(module, entries, bound, overlay or {}, features or {}, state))
+            made = self._prepare(key, (program.pipeline, self._group(program, bound)))
+        return made
 
     def bundle(self, label: str, state: Raster, *, depth_read_only: bool = False) -> Any:
         """A render bundle encoder for passes with the formats of ``state``: recorded once, replayed at no cost."""
@@ -731,7 +737,7 @@ class Gpu(Closing):
 
     # --- pipelines ------------------------------------------------------------------------------------------------
 
-    def _program(self, key: _Key) -> _Program:
+    def _program(self, key: _ProgramKey) -> _Program:
         """A pipeline: the one that is there, or that is being built once it is, or else built now."""
         found = self._programs.get(key)
         if isinstance(found, _Program):
@@ -747,7 +753,7 @@ class Gpu(Closing):
         self._programs[key] = program
         return program
 
-    def _begun(self, key: _Key) -> _Program | None:
+    def _begun(self, key: _ProgramKey) -> _Program | None:
         """A pipeline; inside :meth:`together` None while it is being built."""
         found = self._programs.get(key)
         if isinstance(found, _Program):
@@ -810,8 +816,16 @@ class Gpu(Closing):
             )
         return group
 
+    def _prepare[T](self, key: Any, made: T) -> T:
+        """Keep what a pass of the next frame looks up whole, without asking for its program and its group apart."""
+        if len(self._prepared) >= _MOST_PREPARED:
+            self._prepared.clear()
+        self._prepared[key] = made
+        return made
+
     def forget_groups(self) -> None:
         """Drop cached bind groups, so that destroyed resources are not kept alive by them."""
+        self._prepared.clear()
         for program in self._programs.values():
             if isinstance(program, _Program):
                 program.groups.clear()
@@ -827,6 +841,7 @@ class Gpu(Closing):
         for buffer in self._constants.values():
             buffer.destroy()
         self._constants.clear()
+        self._prepared.clear()
         self._programs.clear()
         self._samplers.clear()
         if self._timed:
@@ -850,7 +865,10 @@ class ComputePass:
         """Give names to resources: a :class:`Bound`, :class:`Parts`, or a texture (sampled), buffer (read) or
         parameter buffer.
         """
-        self._bound.update(_all_bound({**(scope or {}), **resources}))
+        if scope:
+            self._bound.update(_all_bound(scope))
+        if resources:
+            self._bound.update(_all_bound(resources))
         return self
 
     def overlay(self, modules: Mapping[str, str]) -> Self:
@@ -875,14 +893,19 @@ class ComputePass:
 
     def prepare(self) -> Prepared:
         """The same pass, to be run many times at little cost."""
-        key = _key(self._module, (self._entry,), self._bound, self._overlay, self._features, None)
-        return Prepared(self._gpu, self._label, key, self._bound)
+        gpu, entries = self._gpu, (self._entry,)
+        key = _key(self._module, entries, self._bound, self._overlay, self._features, self._label)
+        made: Prepared | None = gpu._prepared.get(key)
+        if made is None:
+            program = _program_key(self._module, entries, self._bound, self._overlay, self._features, None)
+            made = gpu._prepare(key, Prepared(gpu, self._label, program, self._bound))
+        return made
 
 
 class Prepared:
     """A compute pass with its pipeline and bindings. It keeps what is bound alive, so it must not outlive that."""
 
-    def __init__(self, gpu: Gpu, label: str, key: _Key, bound: Mapping[str, Bound]) -> None:
+    def __init__(self, gpu: Gpu, label: str, key: _ProgramKey, bound: Mapping[str, Bound]) -> None:
         self._gpu, self._label, self._key = gpu, label, key
         self._program = gpu._begun(key)
         self._group = gpu._group(self._program, bound) if self._program else None
@@ -925,7 +948,10 @@ class Prepared:
         self._record(lambda native, _: native.dispatch_workgroups_indirect(arguments.native, offset))
 
     def _record(self, dispatch: Callable[[Any, tuple[int, int, int]], None]) -> None:
-        self._gpu._record(partial(self._encode, dispatch), ready=self._program is not None)
+        if self._program is not None and not self._gpu._kept:
+            self._encode(dispatch)
+        else:
+            self._gpu._record(partial(self._encode, dispatch), ready=self._program is not None)
 
     def _encode(self, dispatch: Callable[[Any, tuple[int, int, int]], None]) -> None:
         gpu, program = self._gpu, self._built()
@@ -946,7 +972,21 @@ def _threads() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _all_bound(resources: Mapping[str, Any]) -> dict[str, Bound]:
+def _key(
+    module: str,
+    entries: tuple[str, ...],
+    bound: Mapping[str, Bound],
+    overlay: Mapping[str, str],
+    features: Mapping[str, bool],
+    more: Any,
+) -> tuple[Any, ...]:
+    """What a pass is known by: bindings by their names and by what they are themselves, which the key keeps alive."""
+    return (module, entries, more, *bound, *bound.values(), *overlay.items(), *features.items())
+
+
+def _all_bound(resources: Mapping[str, Any]) -> Mapping[str, Bound]:
+    if set(map(type, resources.values())) == {Bound}:  # as it is in most passes
+        return resources
     bound: dict[str, Bound] = {}
     for name, value in resources.items():
         if type(value) is Bound:
