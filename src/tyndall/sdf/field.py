@@ -53,6 +53,7 @@ _ROOMY = 1.5  # times what an object's longest side must hold, from where on it 
 _LEAF_SLOTS = 7  # of a leaf with a name
 _COUNTERS = 8  # of an object: entries used, overflows, words of marks used by a job, eighths used
 _LEAST_ENTRIES, _MOST_ENTRIES = 1 << 12, 1 << 23
+_AMPLE_ENTRIES = 1 << 21  # up to here twice as many for each instruction
 _PART_SIZE = 4096  # instructions for which one part is enough
 _LONG = 96  # instructions: a longer program's leaves are sorted out first
 _LONGEST = 32 * 1024  # of those; beyond, cells walk all of it; as in prune.wesl
@@ -101,6 +102,12 @@ class _Parts:
             bool((linear == np.eye(3)).all()) and all(p.leaf >= 0 for p in parts),
             bool((numbers == np.arange(len(parts))).all()),
         )
+
+
+def _entries(instructions: int) -> int:
+    """How many entries lists of a program's cells may have in all: about twice what scenes were seen to need."""
+    ample = min(8192 * instructions, _AMPLE_ENTRIES)
+    return int(np.clip(max(ample, 4096 * instructions), _LEAST_ENTRIES, _MOST_ENTRIES))
 
 
 def _matrices(given: Floats) -> Floats:
@@ -234,7 +241,7 @@ class Field(Closing):
             shape: Any = implicit.shape
             program = compile_shape(shape, self._kinds)
             levels = self._levels(program, shape.box, gpu.part_bytes // 16 - cells - left * _COARSE**3)
-            capacity = int(np.clip(4096 * program.size, _LEAST_ENTRIES, _MOST_ENTRIES)) if levels else 0
+            capacity = _entries(program.size) if levels else 0
             made = _Object(implicit, program, words, slots, materials, levels, cells, 0, capacity, shape.box)
             self._objects.append(made)
             words, slots = words + program.size, slots + len(program.slots)
