@@ -617,7 +617,7 @@ class Field(Closing):
             table[number] = job
         gpu.write(self._job_buffer, table)
         for i in dirty:
-            gpu.encoder.clear_buffer(self._counter_buffer.native, 4 * _COUNTERS * i, 4 * _COUNTERS)
+            gpu.clear_buffer(self._counter_buffer, 4 * _COUNTERS * i, 4 * _COUNTERS)
         scope = {
             **{name: bound for name, bound in self.bindings.items() if name in ("implicit_objects", "implicit_slots")},
             "implicit_lists": self._list_buffer.read_write(),
@@ -631,7 +631,7 @@ class Field(Closing):
         }
         for number, job in enumerate(listed):
             if number:  # one job's marks are read before the next one begins
-                gpu.encoder.clear_buffer(self._counter_buffer.native, 4 * (int(job["counters"]) + 2), 4)
+                gpu.clear_buffer(self._counter_buffer, 4 * (int(job["counters"]) + 2), 4)
             here = {**scope, "implicit_job": gpu.constant(number)}
             if int(job["alive_words"]):
                 gpu.clear_buffer(self._least_buffer)
