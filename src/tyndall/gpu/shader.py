@@ -82,8 +82,19 @@ class Linker:
     def dtype(self, path: str) -> np.dtype[Any]:
         """The numpy layout of a WESL struct, ``package::wesl::light::Light``; its itemsize is the array stride."""
         if path not in self._dtypes:
-            self._dtypes[path] = wesl.reflect.numpy_dtype(self._compiler, path)
+            self._dtypes[path] = self._layout_alone(path) or wesl.reflect.numpy_dtype(self._compiler, path)
         return self._dtypes[path]
+
+    def _layout_alone(self, path: str) -> np.dtype[Any] | None:
+        """The layout of a struct that needs nothing else of its module, of which everything imported would be parsed."""
+        module, _, name = path.rpartition("::")
+        struct = re.search(rf"^struct {name} {{[^}}]*}}", self.modules.get(module, ""), re.MULTILINE)
+        if struct is None or "@if" in struct[0]:
+            return None
+        try:
+            return wesl.reflect.numpy_dtype(wesl.Compiler(modules={module: struct[0]}), path)
+        except wesl.CompileError:
+            return None
 
     def workgroup(self, linked: Linked, entry: str) -> tuple[int, int, int]:
         """The workgroup size of a compute entry point."""

@@ -491,20 +491,25 @@ class _Compiler:
                 self._emit(child, inside, inner if i else PUSH, HARD, 0.0)
         self._join(join, blend, k, lipschitz)
 
-    def _pairs(self, children: list[tuple[Shape, _Context]], inner: int, kind: int, width: float) -> None:
-        """Smooth joins of neighbours by pairs, as :meth:`Combination.distance` takes them."""
+    def _pairs(
+        self, children: list[tuple[Shape, _Context]], inner: int, kind: int, width: float, above: int = 0
+    ) -> None:
+        """Smooth joins of neighbours by pairs, as :meth:`Combination.distance` takes them; ``above``: joins of the same
+        kind around them.
+        """
         if len(children) == 1:
-            self._emit(*children[0], PUSH, HARD, 0.0)
+            child, c = children[0]
+            self._emit(child, _below_unions(c, kind, width, above), PUSH, HARD, 0.0)
             return
-        if children[0][1].margin >= 0:
-            children = [(child, _below_union(c, kind, width)) for child, c in children]
+        above += 1
         # Pairing from the left gives a first half of a power of two.
         half = 1 << (len(children) - 1).bit_length() - 1
-        self._pairs(children[:half], inner, kind, width)
+        self._pairs(children[:half], inner, kind, width, above)
         if len(children) - half == 1:
-            self._emit(*children[half], inner, kind, width)
+            child, c = children[half]
+            self._emit(child, _below_unions(c, kind, width, above), inner, kind, width)
         else:
-            self._pairs(children[half:], inner, kind, width)
+            self._pairs(children[half:], inner, kind, width, above)
             self._join(inner, kind, width, max(child.lipschitz * c.stretch for child, c in children))
 
     def _scope(
@@ -561,11 +566,13 @@ class _Compiler:
             self._word(LEAVE, code, flags=PLACED if shape.warps else 0, slot=slot)
 
 
-def _below_union(c: _Context, kind: int, width: float) -> _Context:
-    """What is around a part of a smooth union."""
+def _below_unions(c: _Context, kind: int, width: float, count: int) -> _Context:
+    """What is around a part of that many smooth unions, each in the next."""
+    if c.margin < 0 or count == 0:
+        return c
     if kind == EXPONENTIAL:  # is k·log₂(2) below two equal values, and nothing is left of one 24 k above the other
-        return replace(c, margin=c.margin + 25.0 * width, sag=c.sag + width)
-    return replace(c, shares=c.shares + width, widest=max(c.widest, width), sag=c.sag + 0.25 * width)
+        return replace(c, margin=c.margin + 25.0 * count * width, sag=c.sag + count * width)
+    return replace(c, shares=c.shares + count * width, widest=max(c.widest, width), sag=c.sag + 0.25 * count * width)
 
 
 def _is_leaf(shape: Shape) -> bool:
