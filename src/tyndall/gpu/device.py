@@ -19,6 +19,7 @@ import logging
 import os
 import sys
 import tempfile
+import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
@@ -228,6 +229,12 @@ class _Program:
     workgroup: tuple[int, int, int]  # of a compute pipeline
 
 
+class _Waiting(threading.local):
+    """What a thread has not recorded yet, in order; None outside of :meth:`Gpu.together`."""
+
+    kept: list[Callable[[], object]] | None = None
+
+
 class _Calls:
     """Stands for a native pass that has not begun yet: keeps what is called of it, none of which answers anything."""
 
@@ -283,8 +290,8 @@ class Gpu(Closing):
         self.linker = Linker.of_package()
         self.built: list[Built] = []
         self._programs: dict[_ProgramKey, _Program | Future[_Program]] = {}
-        self._builders: ThreadPoolExecutor | None = None
-        self._kept: list[Callable[[], object]] | None = None  # inside `together`: what waits for a pipeline, in order
+        self._builders = ThreadPoolExecutor(_threads(), thread_name_prefix="tyndall.pipelines")
+        self._waiting = _Waiting()
         self._prepared: dict[Any, Any] = {}  # passes and pipelines with their groups, by all that they were made of
         self._samplers: dict[Any, Sampler] = {}
         self._constants: dict[int, Buffer] = {}
@@ -549,6 +556,10 @@ class Gpu(Closing):
         self._chain.end()
         self._chain = None
 
+    @property
+    def _kept(self) -> list[Callable[[], object]] | None:
+        return self._waiting.kept
+
     @contextlib.contextmanager
     def together(self) -> Iterator[None]:
         """Build the pipelines that passes inside the block still lack side by side, each in a thread of its own.
@@ -560,7 +571,7 @@ class Gpu(Closing):
         if self._kept is not None:
             yield
             return
-        self._kept = []
+        self._waiting.kept = []
         try:
             yield
             self._catch_up()
@@ -568,7 +579,7 @@ class Gpu(Closing):
             self.discard()
             raise
         finally:
-            self._kept = None
+            self._waiting.kept = None
 
     def _record(self, record: Callable[[], object], *, ready: bool = True) -> None:
         """Record something now, or in its turn where something before it, or itself, waits for a pipeline."""
@@ -579,7 +590,7 @@ class Gpu(Closing):
 
     def _catch_up(self) -> None:
         if self._kept:
-            kept, self._kept = self._kept, []
+            kept, self._waiting.kept = self._kept, []
             for record in kept:
                 record()
 
@@ -761,8 +772,6 @@ class Gpu(Closing):
         if self._kept is None:
             return self._program(key)
         if found is None:
-            if self._builders is None:
-                self._builders = ThreadPoolExecutor(_threads(), thread_name_prefix="tyndall.pipelines")
             self._programs[key] = self._builders.submit(self._build, *key)
         return None
 
@@ -835,9 +844,7 @@ class Gpu(Closing):
     def close(self) -> None:
         """Free everything. The ledger then holds what others forgot to destroy."""
         self.discard()
-        if self._builders is not None:
-            self._builders.shutdown(cancel_futures=True)  # waits for what uses the device
-            self._builders = None
+        self._builders.shutdown(cancel_futures=True)  # waits for what uses the device
         for buffer in self._constants.values():
             buffer.destroy()
         self._constants.clear()

@@ -86,7 +86,7 @@ class Linker:
         return self._dtypes[path]
 
     def _layout_alone(self, path: str) -> np.dtype[Any] | None:
-        """The layout of a struct that needs nothing else of its module, of which everything imported would be parsed."""
+        """The layout of a struct that needs nothing else of its module, whose imports would all be parsed."""
         module, _, name = path.rpartition("::")
         struct = re.search(rf"^struct {name} {{[^}}]*}}", self.modules.get(module, ""), re.MULTILINE)
         if struct is None or "@if" in struct[0]:
