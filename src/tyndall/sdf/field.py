@@ -7,7 +7,7 @@ into 16³ cells, then each of them into 4³: 64³. A cell walks its parent's pro
 out what cannot matter anywhere inside: of two joined values the one that is beyond the other by more than both can
 change. What stays is a handful of instructions, and its value in the cell is that of the whole, bit for bit up to
 rounding. Cells in which no surface can be hold no program, only the value at their centre. Where a fine cell's program
-is still long, it is split once more, into eighths (see ``prune.wesl``). Below unions alone it is enough to compare every
+is still long, it is split once more, into eighths (``prune.wesl``). Below unions alone it is enough to compare every
 leaf with the least of all, which needs no walk from one instruction to the next (``unions.wesl``): so ten thousand
 primitives that all move are pruned anew in each frame.
 
