@@ -192,7 +192,7 @@ class World(Closing):
         if not layout.leaves:
             return
         scope = {
-            **self.bindings,
+            **self._bound,
             "parts": self._parts.read(),
             "part_count": gpu.constant(len(layout.parts)),
             "group_boxes": self._boxes.read(),
@@ -205,7 +205,7 @@ class World(Closing):
         layout.instances["root"] = gpu.read_buffer(self._roots)[layout.instances["group"]]
         gpu.write(self._instances, layout.instances)
         self._scope = {
-            **self.bindings,
+            **self._bound,
             "group_boxes": self._box.read(),
             "hanging": self._hanging.read(),
             "instances": self._instances.read(),
