@@ -146,13 +146,16 @@ def test_pipelines_of_long_ago_are_let_go(gpu: Gpu, monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr("tyndall.frame._REMEMBERED", 1)
     with Renderer(told(LEFT), SIZE, gpu=gpu, **QUIET) as renderer:
         renderer.draw()
-        sizes = []
-        for shape in (sphere(0.3), box(0.3), sphere(0.4)):
+        for shape in (sphere(0.3), box(0.3)):
+            before = renderer._known
             renderer.reshape("left", shape)
             renderer.settle()
             renderer.draw()
-            sizes.append(len(gpu._programs))
-        assert sizes[2] == sizes[0]
+            now = renderer._known
+            assert [sum(slot in key[3] for key in gpu._programs) > 0 for slot in (*before, *now)] == [
+                *(False for _ in before),
+                True,
+            ]
 
 
 def test_a_snippet_is_added_by_name_and_removed(gpu: Gpu) -> None:
