@@ -587,7 +587,7 @@ class Renderer(Closing):
         beside what is drawn, by a thread of its own, pipelines included; :meth:`draw` goes on drawing the old ones,
         and takes the new ones with the first frame for which they are ready. What stays is not moved: objects that are
         among both are where :meth:`place`, :meth:`move` and :meth:`edit` have left them by then. Where the set of kinds
-        is the same, nothing is compiled. Of what is asked for meanwhile the last is prepared next.
+        (and the number of objects) is the same, and no expression nests deeper, nothing is compiled. Of what is asked for meanwhile the last is prepared next.
 
         What is wrong with a shape is told here. What only the preparation finds, such as too little memory, the next
         :meth:`draw` or :meth:`settle` raises, and what is drawn stays.
