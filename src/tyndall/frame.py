@@ -51,7 +51,7 @@ from tyndall.scene.model import (
 from tyndall.sdf.field import Field, check_snippets
 from tyndall.sdf.marching import Marching
 from tyndall.techniques import FAMILIES, Technique
-from tyndall.techniques.contract import Unsupported, View
+from tyndall.techniques.contract import View
 from tyndall.techniques.reflection.field_reflections import shows_surroundings
 from tyndall.techniques.shadow.depth_maps import first_layers
 from tyndall.techniques.volume import Filled
@@ -249,7 +249,7 @@ class Renderer(Closing):
 
     def _buffer(self, label: str, size: int, element: str, usage: str, *, own: bool = False) -> Any:
         return self._held(
-            (label, size, element, usage, id(self) if own else 0),
+            (label, size, element, usage, object() if own else None),
             lambda: self.gpu.buffer(f"frame.{label}", size, owner=OWNER, element=element, usage=usage),
         )
 
@@ -587,7 +587,8 @@ class Renderer(Closing):
         beside what is drawn, by a thread of its own, pipelines included; :meth:`draw` goes on drawing the old ones,
         and takes the new ones with the first frame for which they are ready. What stays is not moved: objects that are
         among both are where :meth:`place`, :meth:`move` and :meth:`edit` have left them by then. Where the set of kinds
-        (and the number of objects) is the same, and no expression nests deeper, nothing is compiled. Of what is asked for meanwhile the last is prepared next.
+        and the number of objects are the same, and no expression nests deeper, nothing is compiled. Of what is asked
+        for meanwhile the last is prepared next. Until then the device holds the techniques' own images twice.
 
         What is wrong with a shape is told here. What only the preparation finds, such as too little memory, the next
         :meth:`draw` or :meth:`settle` raises, and what is drawn stays.
@@ -666,7 +667,7 @@ class Renderer(Closing):
         if failure is None:
             try:
                 self._take_over(change.ready.result())
-            except Unsupported as error:
+            except Exception as error:
                 failure = error
         elif any(self.technique(family) is not one for family, one in change.techniques.items()):
             failure = None  # what it shared may have been freed with the technique
