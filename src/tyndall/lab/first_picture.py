@@ -13,7 +13,7 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -22,7 +22,7 @@ _BEGIN = time.perf_counter()
 
 import tyndall  # noqa: E402
 from tyndall.frame import Renderer  # noqa: E402
-from tyndall.gpu.device import Gpu  # noqa: E402
+from tyndall.gpu.device import Built, Gpu  # noqa: E402
 from tyndall.lab.baseline import Baseline, Loop  # noqa: E402
 from tyndall.lab.busy import Busy  # noqa: E402
 from tyndall.lab.measure import Times, measure  # noqa: E402
@@ -69,8 +69,11 @@ def run(order: Order, gpu: Gpu | None = None, scene: Scene | None = None) -> dic
 
     Returns:
         ``first_ms``: from a scene and a device to a picture; ``compile_ms`` of it for the plain loop; ``warm_ms``: the
-        same again, with pipelines that the device has; ``device_ms`` and ``import_ms`` before it, where the process
-        begins with them; ``frame_ms``.
+        same again, with pipelines that the device has; ``import_ms``, ``device_ms`` and ``scene_ms`` before it, where
+        the process begins with them; ``frame_ms``. Parts of ``first_ms``: ``setup_ms`` until there is a renderer,
+        ``record_ms`` until its first frame is recorded, which waits for pipelines; ``link_ms``, ``modules_ms`` and
+        ``pipelines_ms`` are what all ``pipelines`` together took, in as many threads as there are, and ``slowest`` is
+        the one that took longest, with its milliseconds.
     """
     size = (int(order.size[0]), int(order.size[1]))
     made = gpu is None
@@ -85,11 +88,15 @@ def run(order: Order, gpu: Gpu | None = None, scene: Scene | None = None) -> dic
         described = scene or open_scene(order.scene)
         found["scene_ms"] = _since(begin)
         for name in ("first_ms", "warm_ms"):
-            begin = time.perf_counter()
+            begin, before = time.perf_counter(), len(device.built)
             with _make(order, device, described, size) as drawn:
+                setup_ms = _since(begin)
                 drawn.draw()
+                record_ms = round(_since(begin) - setup_ms, 3)
                 device.wait()
                 found[name] = _since(begin)
+                if name == "first_ms":
+                    found |= {"setup_ms": setup_ms, "record_ms": record_ms, **_parts(device.built[before:])}
                 if name == "first_ms" and isinstance(drawn, Baseline):
                     found["compile_ms"] = round(drawn.compile_ms, 3)
                 if name == "warm_ms" and order.seconds > 0:
@@ -98,6 +105,18 @@ def run(order: Order, gpu: Gpu | None = None, scene: Scene | None = None) -> dic
         if made:
             device.close()
     return found
+
+
+def _parts(built: Sequence[Built]) -> dict[str, Any]:
+    """What pipelines took, all together, and the one that took longest."""
+    sums = {
+        "link_ms": round(sum(each.link_ms for each in built), 3),
+        "modules_ms": round(sum(each.module_ms for each in built), 3),
+        "pipelines_ms": round(sum(each.pipeline_ms for each in built), 3),
+    }
+    took = {each.label: round(each.link_ms + each.module_ms + each.pipeline_ms, 3) for each in built}
+    slowest = max(took, key=lambda label: took[label], default=None)
+    return {"pipelines": len(built), **sums, "slowest": {slowest: took[slowest]} if slowest else {}}
 
 
 def _make(order: Order, gpu: Gpu, scene: Scene, size: tuple[int, int], settings: Loop | None = None) -> Any:
