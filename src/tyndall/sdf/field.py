@@ -50,6 +50,7 @@ _COARSE, _FINE = 16, 64  # cells along the longest side, of both levels
 _SPARE = 0.04  # of its longest side, by which an object's box grows beyond what it must hold
 _ROOMY = 1.5  # times what an object's longest side must hold, from where on it shrinks
 _LEAF_SLOTS = 7  # of a leaf with a name
+_MANY = 256  # leaves, from where on their places are sent alone, and put into their slots by the device
 _GAP = 256  # slots between two that move, for which they are written together
 _COUNTERS = 8  # of an object: entries used, overflows, words of marks used at each level
 _LEAST_ENTRIES, _MOST_ENTRIES = 1 << 12, 1 << 23
@@ -65,8 +66,7 @@ _MOST_SLOTS = 1 << 24  # before samples, whose place is a float
 @dataclass(frozen=True, eq=False)
 class _Parts:
     """The parts of a name in an object, or of several, as arrays over them; a copy of a part is one more of the same
-    number. Slots and instructions are those of the program; ``at`` and ``leaf_at`` are slots and leaves as slices where
-    they can be.
+    number. Slots and instructions are those of the program; ``leaf_at`` are the leaves as a slice where they can be.
     """
 
     name: str
@@ -79,7 +79,6 @@ class _Parts:
     after: Floats
     factors: Floats
     rest: Floats  # (3, N)
-    at: slice | NDArray[np.intp]
     leaf_at: slice | NDArray[np.intp]
     spans: tuple[tuple[int, int], ...]  # of slots, that are written when they move
     is_straight: bool
@@ -104,7 +103,6 @@ class _Parts:
             after,
             np.array([p.factor for p in parts]),
             np.ascontiguousarray((before[:, :3, 3] + after[:, :3, 3]).T),
-            _evenly(slots),
             _evenly(leaves),
             ((int(slots.min()), int(slots.max()) + _LEAF_SLOTS),),
             bool((linear == np.eye(3)).all()) and all(p.leaf >= 0 for p in parts),
@@ -128,13 +126,19 @@ class _Parts:
             name=", ".join(parts.name for parts in sets),
             count=sum(parts.count for parts in sets),
             rest=np.concatenate([parts.rest for parts in sets], axis=1),
-            at=together["slots"],
             leaf_at=together["leaves"],
             spans=tuple(spans),
             is_straight=all(parts.is_straight for parts in sets),
             is_in_order=False,
             **together,
         )
+
+    @cached_property
+    def first_rows(self) -> NDArray[np.float32]:
+        """(N, 4): first slots of leaves, with their factors at rest and whichever places were put into them."""
+        made = np.zeros((len(self.slots), 4), np.float32)
+        made[:, 3] = self.factors
+        return made
 
     @cached_property
     def owned(self) -> NDArray[np.bool_]:
@@ -263,6 +267,9 @@ class Field(Closing):
         self._buffers: list[Buffer] = []
         self._params: ParamsBuffer | None = None
         self._objects: list[_Object] = []
+        self._lists: dict[tuple[_Object, str], tuple[Buffer, Buffer]] = {}  # places and slots of many leaves of a name
+        self._listed: set[tuple[_Object, str]] = set()  # whose last motion was sent as such a list
+        self._waiting: set[tuple[_Object, str]] = set()  # and is not in the slots yet
         self.uploaded = 0
         try:
             self._upload(implicits)
@@ -511,15 +518,27 @@ class Field(Closing):
     def _shift(self, made: _Object, parts: _Parts, ways: Floats) -> None:
         """Write the places of leaves that are only moved."""
         made.places[:, parts.leaf_at] = places = parts.rest + ways.T
-        slots = self._slots[made.first_slot + 1 :]
+        rows = parts.first_rows
         for axis in range(3):  # one by one: numpy takes longer over many short rows
-            slots[parts.at, axis] = places[axis]
+            rows[:, axis] = places[axis]
+        whole = np.complex128  # a slot as one number
+        self._slots.view(whole)[parts.slots + (made.first_slot + 1), 0] = rows.view(whole)[:, 0]
         if parts.name in made.turned:
-            slots[parts.at, 3] = parts.factors
             made.linear[parts.leaves] = np.eye(3)
             made.turned.discard(parts.name)
             self._flag(made.first_word + parts.entries, np.zeros(len(parts.entries), bool))
-        self._send(made, parts)
+        if len(rows) < _MANY:
+            self._send(made, parts)
+            return
+        if (made, parts.name) not in self._lists:
+            numbers = (parts.slots + (made.first_slot + 1)).astype(np.uint32)
+            self._lists[made, parts.name] = (
+                self._buffer("leaf_places", rows, "vec4f"),
+                self._buffer("leaf_slots", numbers, "u32"),
+            )
+        self._write(self._lists[made, parts.name][0], rows)
+        self._listed.add((made, parts.name))
+        self._waiting.add((made, parts.name))
 
     def _turn(self, made: _Object, parts: _Parts, listed: Sequence[tuple[_Parts, Floats]]) -> None:
         """Write the transforms of parts that are turned, or not leaves: of the names in ``listed``, all together."""
@@ -531,6 +550,9 @@ class Field(Closing):
             raise ParameterError(f"{flat}: a transform that has no inverse")
         rows = np.linalg.inv(placed)[:, :3]
         factors = parts.factors * stretch
+        for one, _ in listed:  # what is written whole must not be put back where it was
+            self._listed.discard((made, one.name))
+            self._waiting.discard((made, one.name))
         slots, leaves = self._slots[made.first_slot + 1 :], parts.owned
         if len(own := parts.own):
             slots[own, :3] = placed[leaves, :3, 3]
@@ -550,7 +572,7 @@ class Field(Closing):
 
     def _send(self, made: _Object, parts: _Parts) -> None:
         first = made.first_slot + 1
-        for low, high in parts.spans:
+        for low, high in parts.spans:  # whatever lies between has its newest numbers in them, too
             self._write(self._slot_buffer, self._slots[first + low : first + high], 16 * (first + low))
 
     def _flag(self, entries: NDArray[np.intp], turned: NDArray[np.bool_]) -> None:
@@ -666,9 +688,20 @@ class Field(Closing):
         """What was recorded is never submitted: the next :meth:`update` records it again."""
         for made in self._objects:
             made.dirty = True
+        self._waiting = set(self._listed)
+
+    def _put_in_place(self) -> None:
+        """Record that places which were sent as a list of their own come to their slots."""
+        for which in self._waiting:
+            places, slots = self._lists[which]
+            self._gpu.compute(f"{self._owner}.place", "package::sdf::places", "place").bind(
+                leaf_places=places, leaf_slots=slots, implicit_slots=self._slot_buffer.read_write()
+            ).dispatch_line(slots.size_bytes // 4)
+        self._waiting.clear()
 
     def update(self) -> None:
         """Record the pruning of what has changed, before what asks the field."""
+        self._put_in_place()
         for made in self._objects:
             if made.moved:
                 self._fit(made)
@@ -750,5 +783,8 @@ class Field(Closing):
         for resource in self.resources():
             resource.destroy()
         self._buffers.clear()
+        self._lists.clear()
+        self._listed.clear()
+        self._waiting.clear()
         self._params = None
         self._gpu.forget_groups()

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from tyndall.gpu.device import Gpu, GpuError
 from tyndall.gpu.params import ParameterError
 from tyndall.lab import field_check
-from tyndall.scene.model import Implicit
+from tyndall.scene.model import Implicit, translations
 from tyndall.sdf import Grid, Shape, box, intersection, sphere, subtraction, torus, union
 from tyndall.sdf.field import Field
 from tyndall.sdf.marching import Marching
@@ -206,6 +206,41 @@ def test_moved_parts_are_where_they_were_moved(
     for given in (turns(count, rng) if turned else rng.normal(0, 0.2, (count, 3)), np.zeros((count, 3))):
         field.move(part, given)
         agree(gpu, field, NAMES.index(name), moved(SHAPES[name], part, given))
+
+
+@pytest.mark.parametrize(("name", "part", "count"), [("balls", "ball", 300), ("copies", "bead", 1)])
+def test_what_was_smaller_and_is_only_moved_has_its_size_again(
+    gpu: Gpu, field: Field, name: str, part: str, count: int
+) -> None:
+    """Also where the frame that was to show it failed."""
+    ways = np.random.default_rng(4).normal(0, 0.1, (count, 3))
+    field.move(part, np.diag([0.5, 0.5, 0.5, 1.0])[None].repeat(count, 0))
+    field.move(part, ways)
+    field.update()
+    gpu.discard()
+    field.forget()
+    agree(gpu, field, NAMES.index(name), moved(SHAPES[name], part, ways))
+    turned = turns(count, np.random.default_rng(6))
+    field.move(part, ways)
+    field.move(part, turned)
+    agree(gpu, field, NAMES.index(name), moved(SHAPES[name], part, turned))
+    field.move(part, np.zeros((count, 3)))
+
+
+def test_several_names_move_as_one_after_another(gpu: Gpu) -> None:
+    rng = np.random.default_rng(8)
+    pair = sphere(0.1).named("a").at(0.2) | box(0.2).named("b").at(-0.2)
+    group = union(torus(0.2, 0.05), sphere(0.1).at(0, 0.2), smooth=0.05).named("c").at(0, 0, 0.3)
+    shape = union(pair, group, *(sphere(0.05).at(*rng.uniform(-0.5, 0.5, 3)) for _ in range(6)), smooth=0.05)
+    given = {"a": rng.normal(0, 0.1, (1, 3)), "b": turns(1, rng), "c": turns(1, rng)}
+    there = shape.moved(
+        {name: iter(moves if moves.ndim == 3 else translations(moves)) for name, moves in given.items()}
+    )
+    with Field(gpu, [Implicit(shape)]) as field:
+        field.move_all(given)
+        agree(gpu, field, 0, there)
+        with pytest.raises(ParameterError, match="c: a transform that has no inverse"):
+            field.move_all({"b": turns(1, rng), "c": np.zeros((1, 4, 4))})
 
 
 @pytest.mark.parametrize("factor", [0.15, 2.0])
