@@ -27,6 +27,7 @@ import wgpu
 from numpy.typing import NDArray
 
 from tyndall.gpu import params as declared
+from tyndall.gpu.passes import Passes
 from tyndall.gpu.resources import (
     BYTES_PER_TEXEL,
     Bound,
@@ -247,6 +248,7 @@ class Gpu(Closing):
             self._resolved, self._readback = (timer.native for timer in self._timers)
             self._period = _timestamp_period(self.device)
         self._submitted_labels: list[str] = []
+        self.passes = Passes(self._queries if self._timed else None)
 
     @property
     def depth_format(self) -> str:
@@ -454,15 +456,25 @@ class Gpu(Closing):
 
     def timestamps(self, label: str) -> dict[str, Any] | None:
         """Timestamp writes for a pass of this name; None where the adapter has no timers or too many passes ran."""
-        if not self._timed or len(self._labels) >= _MAX_TIMED_PASSES:
+        if (slot := self._timer(label)) is None:
             return None
-        slot = 2 * len(self._labels)
-        self._labels.append(label)
         return {
             "query_set": self._queries,
             "beginning_of_pass_write_index": slot,
             "end_of_pass_write_index": slot + 1,
         }
+
+    def _timer(self, label: str) -> int | None:
+        """The first of the two queries of a pass of this name."""
+        if not self._timed or len(self._labels) >= _MAX_TIMED_PASSES:
+            return None
+        self._labels.append(label)
+        return 2 * len(self._labels) - 2
+
+    def begin_compute(self, label: str) -> Any:
+        """A new pass for :attr:`passes`."""
+        encoder = self.encoder  # a new one begins a new list of timers
+        return self.passes.begin(encoder, label, self._timer(label))
 
     def compute(self, label: str, module: str, entry: str = "main") -> ComputePass:
         """A compute pass of one dispatch; see the module's docstring."""
@@ -471,14 +483,12 @@ class Gpu(Closing):
     @contextlib.contextmanager
     def chain(self, label: str) -> Iterator[None]:
         """One compute pass of this name around all that is dispatched inside the block, in order, timed as one."""
-        encoder = self.encoder
-        stamps = self.timestamps(label)
-        self._chain = encoder.begin_compute_pass(label=label, **({"timestamp_writes": stamps} if stamps else {}))
+        self._chain = self.begin_compute(label)
         try:
             yield
         finally:
-            self._chain.end()
-            self._chain = None
+            chain, self._chain = self._chain, None
+            self.passes.end(chain)
 
     @contextlib.contextmanager
     def render(
@@ -787,29 +797,28 @@ class Prepared:
     def run(self, x: int, y: int = 1, z: int = 1) -> None:
         """Run that many workgroups: in a pass of its own, or as part of the chain that is open."""
         native = self._begin()
-        native.dispatch_workgroups(x, y, z)
-        self._end(native)
+        try:
+            self.gpu.passes.dispatch(native, x, y, z)
+        finally:
+            self._end(native)
 
     def run_indirect(self, arguments: Buffer, offset: int = 0) -> None:
         """As :meth:`run`, of the three numbers of workgroups that stand in a buffer at a byte offset."""
         native = self._begin()
-        native.dispatch_workgroups_indirect(arguments.native, offset)
-        self._end(native)
+        try:
+            self.gpu.passes.dispatch_indirect(native, arguments.native, offset)
+        finally:
+            self._end(native)
 
     def _begin(self) -> Any:
         gpu = self.gpu
-        native = gpu._chain
-        if native is None:
-            encoder = gpu.encoder  # a new one begins a new list of timers
-            stamps = gpu.timestamps(self.label)
-            native = encoder.begin_compute_pass(label=self.label, **({"timestamp_writes": stamps} if stamps else {}))
-        native.set_pipeline(self.pipeline)
-        native.set_bind_group(0, self.group)
+        native = gpu._chain or gpu.begin_compute(self.label)
+        gpu.passes.use(native, self.pipeline, self.group)
         return native
 
     def _end(self, native: Any) -> None:
         if self.gpu._chain is None:
-            native.end()
+            self.gpu.passes.end(native)
 
 
 def _key(
