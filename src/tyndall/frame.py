@@ -690,6 +690,8 @@ def pack_camera(camera: Camera, scene: Scene, size: tuple[int, int], dtype: np.d
 def shifted(row: Any, shift: tuple[float, float]) -> Any:
     """A copy of a camera's uniform whose samples lie that many pixels (right, down) of the pixels' centres."""
     moved = row.copy()
+    if not any(shift):
+        return moved
     width, height = row["size"]
     ndc = (-2 * shift[0] / width, 2 * shift[1] / height)  # the picture moves against the samples
     moved["jitter"] = ndc

@@ -291,8 +291,8 @@ def test_a_dispatch_beyond_the_limit_is_an_error_and_the_next_frame_is_well(gpu:
     ):
         scope = {"values": source.split(), "doubled": target.split(write=True), "count": gpu.constant(8)}
         prepared = gpu.compute("test.double", path).bind(scope).prepare()
+        prepared.run(1 << 20)
         with pytest.raises(wgpu.GPUError, match="dispatch group size"):
-            prepared.run(1 << 20)
             gpu.submit()
         gpu.discard()
         prepared.run(1)
