@@ -301,7 +301,8 @@ class Renderer(Closing):
             self._move(self.scene.motion(time))
             self._time = time
         try:
-            self._record(camera or self.scene.camera, jitter, casters)
+            with self.gpu.together():
+                self._record(camera or self.scene.camera, jitter, casters)
         except BaseException:
             self.gpu.discard()  # half a frame must not precede the next one
             for view in self._views.values():
