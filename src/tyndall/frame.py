@@ -26,7 +26,6 @@ from tyndall.content.implicit import Fields
 from tyndall.content.mesh import GBUFFER_TARGETS, Meshes
 from tyndall.gpu.device import Gpu, GpuError
 from tyndall.gpu.params import ParameterError, nearest
-from tyndall.gpu.params import replace as changed
 from tyndall.gpu.resources import Closing, Resource, Texture
 from tyndall.scene.model import (
     Camera,
@@ -168,7 +167,7 @@ class Renderer(Closing):
         self._meshes = Meshes(gpu, self.scene)
         self._content = [self._meshes]
         if self.scene.implicits:
-            marching = self._marching or changed(Marching(), self.scene.looks.get("marching", {}))
+            marching = self._marching or Marching.of(self.scene.looks)
             self._fields = Fields(gpu, self.scene, size, marching)
             self._content.append(self._fields)
         for volume in self.scene.volumes:

@@ -59,7 +59,7 @@ class Fields:
         self._motion: Buffer | None = None
         self._starts: Buffer | None = None
         self._images: dict[str, Texture] = {}
-        self._maps: dict[int, Texture] = {}
+        self._maps: dict[tuple[int, int], Texture] = {}
         self._shade: Texture | None = None
         self.emits = any(shines(material) for one in scene.implicits for material in materials_of(one))
         self.parts = {
@@ -195,10 +195,9 @@ class Fields:
 
     def _map(self, size: tuple[int, int]) -> Texture:
         """The image of depths for maps of a size, which all maps share one after another."""
-        side = size[0]
-        if side not in self._maps:
-            self._maps[side] = self._gpu.texture("field.map", size, "r32float", owner=OWNER)
-        return self._maps[side]
+        if size not in self._maps:
+            self._maps[size] = self._gpu.texture("field.map", size, "r32float", owner=OWNER)
+        return self._maps[size]
 
     def _shaded(self, size: tuple[int, int]) -> Texture:
         """A bit a light and pixel."""
