@@ -74,6 +74,7 @@ class _Parts:
     after: Floats
     factors: Floats
     rest: Floats
+    flat: NDArray[np.bool_]
     is_straight: bool
     is_in_order: bool
 
@@ -96,6 +97,7 @@ class _Parts:
             after,
             np.array([p.factor for p in parts]),
             before[:, :3, 3] + after[:, :3, 3],
+            np.array([p.flat for p in parts]),
             bool((linear == np.eye(3)).all()) and all(p.leaf >= 0 for p in parts),
             bool((numbers == np.arange(len(parts))).all()),
         )
@@ -384,7 +386,7 @@ class Field(Closing):
 
         Raises:
             ParameterError: no such name, parts inside of a twist, bend or repetition without end, another number of
-                transforms, or one that has no inverse.
+                transforms, or one that has no inverse or turns a flat part out of its plane.
         """
         given = np.asarray(matrices, np.float64)
         sets = self._parts(name)
@@ -436,8 +438,16 @@ class Field(Closing):
     ) -> None:
         """Write the transforms of parts that are turned, or not leaves."""
         placed = parts.before @ moves @ parts.after
-        stretch = _least_stretches(moves[:, :3, :3])
-        if (stretch < 1e-9).any():
+        linear = moves[:, :3, :3].copy()
+        if parts.flat.any():
+            if linear[parts.flat, 2, :2].any() or linear[parts.flat, :2, 2].any():
+                raise ParameterError(
+                    f"{parts.name}: it is turned out of the plane that it lies in; name what is extruded or revolved"
+                )
+            # Whatever is done across its plane changes nothing in it, and must not be its least stretch.
+            linear[parts.flat, 2, 2] = np.abs(linear[parts.flat, :2, :2]).sum(axis=(1, 2))
+        stretch = _least_stretches(linear)
+        if (stretch < 1e-9).any() or (moves[:, 2, 2][parts.flat] == 0).any():
             raise ParameterError(f"{parts.name}: a transform that has no inverse")
         rows = np.linalg.inv(placed)[:, :3].astype(np.float32)
         factors = parts.factors * stretch
