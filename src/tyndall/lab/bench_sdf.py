@@ -28,6 +28,7 @@ import dataclasses
 import os
 import time
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from datetime import date
 from functools import partial
@@ -69,6 +70,7 @@ CHANGES: Mapping[str, Mapping[str, Any]] = {"field": {"cones": 1}, "field_ao": {
 BATCH = 32  # frames between two waits, where frames per second are counted
 STEP = 1 / 60  # s of a scene's own time from frame to frame
 _MOST_LITERAL = 2000  # primitives; a compiler has no end with more
+_SMALL = 64, 36  # pixels of a picture for whose sake a loop is compiled
 
 Progress = Callable[[float, str], object]
 Row = dict[str, Any]
@@ -265,16 +267,32 @@ class _Run:
         s = self._s
         swarms = [f"swarm:{count}" for count in s.swarm]
         codes = [f"swarm:{count}" for count in s.swarm if count <= _MOST_LITERAL]
-        for part, names in (("swarm", swarms), ("scenes", s.scenes), ("swarm", codes)):
-            listed = names is swarms
-            for name in names:
-                for stage in ("fragment", "compute"):
-                    self._loop(part, Order(name, stage, loops=listed))
+        orders = [("swarm", name, True) for name in swarms]
+        orders += [("scenes", name, False) for name in s.scenes] + [("swarm", name, False) for name in codes]
+        stages = ("fragment", "compute")
+        compiled = self._compiled([Order(name, stage) for _, name, listed in orders if not listed for stage in stages])
+        for part, name, listed in orders:
+            for stage in stages:
+                self._loop(part, Order(name, stage, loops=listed), compiled.get((name, stage)))
         for count in s.swarm:
             if count > _MOST_LITERAL:
-                for stage in ("fragment", "compute"):
+                for stage in stages:
                     reason = f"not tried: {count:,} as code"
                     self._row("swarm", f"swarm:{count}").setdefault("loop", {})[stage] = {"failed": reason}
+
+    def _compiled(self, orders: Sequence[Order]) -> dict[tuple[str, str], Row]:
+        """What compiling literal code takes, all of it at once, since each compiler is one thread that takes minutes.
+
+        The driver keeps the results on disk, where the processes that measure find them.
+        """
+        s = self._s
+        if not s.processes or not orders:
+            return {}
+        self._progress(self._done / self._planned, f"compiling {len(orders)} loops at once")
+        small = [dataclasses.replace(order, size=_SMALL, adapter=self.document["adapter"]) for order in orders]
+        with ThreadPoolExecutor(max(1, (os.cpu_count() or 1) - 1)) as pool:
+            found = list(pool.map(partial(in_a_process, timeout=s.timeout), small))
+        return {(order.scene, order.who): row for order, row in zip(orders, found, strict=True)}
 
     def _row(self, part: str, name: str) -> Row:
         """The row of a scene, anew or as it is so far."""
@@ -329,7 +347,7 @@ class _Run:
             "frames": taken.frames,
         }
 
-    def _loop(self, part: str, order: Order) -> None:
+    def _loop(self, part: str, order: Order, compiled: Row | None) -> None:
         s, name = self._s, order.scene
         order = dataclasses.replace(
             order, size=s.size, seconds=s.loop_seconds, frames=s.frames, adapter=self.document["adapter"]
@@ -339,9 +357,11 @@ class _Run:
         def found() -> Row:
             scene = self._scene(name)
             row.update(facts(scene))
-            if s.processes and not order.loops:
-                return in_a_process(order, timeout=s.timeout, keep_compiled=False)
-            return run(order, self._gpu, scene)
+            if compiled is None:
+                return run(order, self._gpu, scene)
+            if "failed" in compiled:
+                return compiled
+            return {**in_a_process(order, timeout=s.timeout), "compile_ms": compiled["compile_ms"]}
 
         text = f"{name} as {'a list' if order.loops else 'code'}, {order.who}"
         self._step(text)
