@@ -159,8 +159,8 @@ SHADOWED: dict[str, tuple[str, bool, dict[str, str]]] = {
     "box-ray_traced_ao": ("box", False, {"volumetric": "off", "shadow": "ray_traced", "occlusion": "ray_traced_ao"}),
 }
 
-# Implicit scenes in motion, with shadows and ambient occlusion asked of the field. Rays are marched as near as can be: what
-# they meet a third of a pixel before it depends on their steps, and so would these few pixels on how cells are pruned.
+# Implicit scenes in motion, with shadows and ambient occlusion asked of the field. Rays are marched as near as can be:
+# what they meet a third of a pixel before it depends on their steps, and so would these pixels on how cells are pruned.
 IMPLICIT = ("portrait", "snail", "jumper", "temple", "swarm:100")
 IMPLICIT_SIZE = (96, 54)
 MOMENT = 0.4  # s
