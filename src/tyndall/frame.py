@@ -333,7 +333,8 @@ class Renderer(Closing):
         if self._fields:
             field = self._fields.field
             self._uploaded = field.uploaded - self._sent
-            self._fields.update()
+            self._fields.update(follows=any(view.technique.reads_motion for view in self._views.values()))
+            self._scope |= self._fields.bindings
             self._sent = field.uploaded
         # Its stencil, where it has one, is cleared with it: drivers pack the two, and clear both at once or neither.
         clear = 0 if images["depth"].has_stencil else None

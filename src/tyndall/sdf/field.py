@@ -214,6 +214,8 @@ class Field(Closing):
         self._kinds, self._shadings = Kinds(), Shadings()
         self._buffers: list[Buffer] = []
         self._params: ParamsBuffer | None = None
+        self._before_buffer: Buffer | None = None  # slots as they were when `remember` was called last
+        self._is_remembered = self._is_known = False  # as they are now; as they were in some frame
         self._objects: list[_Object] = []
         self.uploaded = 0
         try:
@@ -397,6 +399,31 @@ class Field(Closing):
 
     # --- motion ---
 
+    def moved_parts(self) -> NDArray[np.bool_]:
+        """(objects,): whether parts have moved since :meth:`update` was called last."""
+        return np.array([made.moved for made in self._objects], bool)
+
+    @property
+    def remembers(self) -> bool:
+        """Whether it is known where parts were: :meth:`remember` has been called."""
+        return self._is_known
+
+    def remember(self) -> None:
+        """Record where all parts are, after what asks where they were."""
+        if self._before_buffer is None:
+            self._before_buffer = self._buffer("slots_before", self._slot_buffer.size_bytes, "vec4f")
+        elif self._is_remembered:
+            return
+        size = self._slot_buffer.size_bytes
+        self._gpu.encoder.copy_buffer_to_buffer(self._slot_buffer.native, 0, self._before_buffer.native, 0, size)
+        self._is_remembered = self._is_known = True
+
+    @property
+    def before(self) -> dict[str, Any]:
+        """What ``flow.wesl`` binds beyond :attr:`bindings`."""
+        assert self._before_buffer is not None
+        return {"implicit_slots_before": self._before_buffer.read()}
+
     def place(self, index: int, transform: Any) -> None:
         """An object stands elsewhere: one write, and nothing is pruned again."""
         made = self._objects[index]
@@ -459,6 +486,7 @@ class Field(Closing):
         self._write(self._slot_buffer, self._slots[low:high], 16 * low)
         made.moves[parts.name] = given
         made.dirty = made.moved = True
+        self._is_remembered = False
 
     def _turn(
         self, made: _Object, parts: _Parts, moves: Floats, slots: NDArray[np.intp], entries: NDArray[np.intp]
@@ -601,6 +629,7 @@ class Field(Closing):
 
     def forget(self) -> None:
         """What was recorded is never submitted: the next :meth:`update` records it again."""
+        self._is_remembered = self._is_known = False
         for made in self._objects:
             made.dirty = True
 
