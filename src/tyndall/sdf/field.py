@@ -87,6 +87,7 @@ class _Parts:
     after: Floats
     factors: Floats
     rest: Floats  # (3, N)
+    flat: NDArray[np.bool_]
     leaf_at: slice | NDArray[np.intp]
     spans: tuple[tuple[int, int], ...]  # of slots, that are written when they move
     is_straight: bool
@@ -111,6 +112,7 @@ class _Parts:
             after,
             np.array([p.factor for p in parts]),
             np.ascontiguousarray((before[:, :3, 3] + after[:, :3, 3]).T),
+            np.array([p.flat for p in parts]),
             _evenly(leaves),
             ((int(slots.min()), int(slots.max()) + _LEAF_SLOTS),),
             bool((linear == np.eye(3)).all()) and all(p.leaf >= 0 for p in parts),
@@ -122,7 +124,7 @@ class _Parts:
         """Those of several names, one after another, to be turned at once."""
         if len(sets) == 1:
             return sets[0]
-        arrays = ("numbers", "slots", "entries", "leaves", "before", "after", "factors")
+        arrays = ("numbers", "slots", "entries", "leaves", "before", "after", "factors", "flat")
         together: dict[str, Any] = {what: np.concatenate([getattr(p, what) for p in sets]) for what in arrays}
         spans: list[tuple[int, int]] = []
         for low, high in sorted(span for parts in sets for span in parts.spans):
@@ -162,6 +164,11 @@ class _Parts:
     def scopes(self) -> NDArray[np.intp]:
         """First slots of transforms around more than a leaf."""
         return self.slots[~self.owned]
+
+
+def _leaves_plane(moves: Floats) -> bool:
+    """Whether one of (N, 3 or 4, 3 or 4) turns what lies in the plane of x and y out of it."""
+    return bool(moves[:, 2, :2].any() or moves[:, :2, 2].any())
 
 
 def _evenly(numbers: NDArray[np.intp]) -> slice | NDArray[np.intp]:
@@ -305,6 +312,8 @@ class Field(Closing):
         self._kinds, self._shadings, self._stacks = Kinds(), Shadings(), (1, 1)
         self._buffers: list[Buffer] = []
         self._params: ParamsBuffer | None = None
+        self._before_buffer: Buffer | None = None  # slots as they were when `remember` was called last
+        self._is_remembered = self._is_known = False  # as they are now; as they were in some frame
         self._objects: list[_Object] = []
         self._lists: dict[tuple[_Object, str], tuple[Buffer, Buffer]] = {}  # places and slots of many leaves of a name
         self._listed: set[tuple[_Object, str]] = set()  # whose last motion was sent as such a list
@@ -516,6 +525,31 @@ class Field(Closing):
 
     # --- motion ---
 
+    def moved_parts(self) -> NDArray[np.bool_]:
+        """(objects,): whether parts have moved since :meth:`update` was called last."""
+        return np.array([made.moved for made in self._objects], bool)
+
+    @property
+    def remembers(self) -> bool:
+        """Whether it is known where parts were: :meth:`remember` has been called."""
+        return self._is_known
+
+    def remember(self) -> None:
+        """Record where all parts are, after what asks where they were."""
+        if self._before_buffer is None:
+            self._before_buffer = self._buffer("slots_before", self._slot_buffer.size_bytes, "vec4f")
+        elif self._is_remembered:
+            return
+        size = self._slot_buffer.size_bytes
+        self._gpu.encoder.copy_buffer_to_buffer(self._slot_buffer.native, 0, self._before_buffer.native, 0, size)
+        self._is_remembered = self._is_known = True
+
+    @property
+    def before(self) -> dict[str, Any]:
+        """What ``flow.wesl`` binds beyond :attr:`bindings`."""
+        assert self._before_buffer is not None
+        return {"implicit_slots_before": self._before_buffer.read()}
+
     def place(self, index: int, transform: Any) -> None:
         """An object stands elsewhere: one write, and nothing is pruned again."""
         made, row = self._objects[index], self._rows[index]
@@ -534,7 +568,7 @@ class Field(Closing):
 
         Raises:
             ParameterError: no such name, parts inside of a twist, bend or repetition without end, another number of
-                transforms, or one that has no inverse.
+                transforms, or one that has no inverse or turns a flat part out of its plane.
         """
         self.move_all({name: matrices})
 
@@ -581,6 +615,7 @@ class Field(Closing):
         for parts, given in listed:
             made.moves[parts.name] = given
         made.dirty = made.moved = True
+        self._is_remembered = False
 
     def _shift(self, made: _Object, parts: _Parts, ways: Floats) -> None:
         """Write the places of leaves that are only moved."""
@@ -611,10 +646,20 @@ class Field(Closing):
         """Write the transforms of parts that are turned, or not leaves: of the names in ``listed``, all together."""
         moves = listed[0][1] if len(listed) == 1 else np.concatenate([moves for _, moves in listed])
         placed = parts.before @ moves @ parts.after
-        stretch = _least_stretches(moves[:, :3, :3])
-        if (stretch < 1e-9).any():
-            flat = next(one.name for one, moves in listed if (_least_stretches(moves[:, :3, :3]) < 1e-9).any())
-            raise ParameterError(f"{flat}: a transform that has no inverse")
+        linear, flat = moves[:, :3, :3], parts.flat
+        if flat.any():
+            if _leaves_plane(linear[flat]):
+                name = next(one.name for one, moves in listed if _leaves_plane(moves[one.flat]))
+                raise ParameterError(
+                    f"{name}: it is turned out of the plane that it lies in; name what is extruded or revolved"
+                )
+            # Whatever is done across its plane changes nothing in it, and must not be its least stretch.
+            linear = linear.copy()
+            linear[flat, 2, 2] = np.abs(linear[flat, :2, :2]).sum(axis=(1, 2))
+        stretch = _least_stretches(linear)
+        if (stretch < 1e-9).any() or (moves[:, 2, 2][flat] == 0).any():
+            name = next(one.name for one, moves in listed if (_least_stretches(moves[:, :3, :3]) < 1e-9).any())
+            raise ParameterError(f"{name}: a transform that has no inverse")
         rows = np.linalg.inv(placed)[:, :3]
         factors = parts.factors * stretch
         for one, _ in listed:  # what is written whole must not be put back where it was
@@ -770,6 +815,7 @@ class Field(Closing):
 
     def forget(self) -> None:
         """What was recorded is never submitted: the next :meth:`update` records it again."""
+        self._is_remembered = self._is_known = False
         for made in self._objects:
             made.dirty = True
         self._waiting = set(self._listed)

@@ -196,6 +196,7 @@ class Part:
         before, after: 4×4, from its parent's space to the object's (or the scope's), and from its own to its parent's.
         factor: distances at rest, of the leaf or the transform.
         held: what is around it whose numbers follow from where it is at rest, so that it cannot move; "" for nothing.
+        flat: it is a shape in the plane, and stays in it.
     """
 
     number: int
@@ -206,6 +207,7 @@ class Part:
     after: Floats
     factor: float
     held: str = ""
+    flat: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -452,7 +454,8 @@ class _Compiler:
             self._put(*np.linalg.inv(placement)[:3])
         if c.name:
             assert c.before is not None
-            part = Part(c.number, slot, len(self._words), len(self._leaves), c.before, c.matrix, c.factor, c.held)
+            entry, leaf, flat = len(self._words), len(self._leaves), shape.dimension == 2
+            part = Part(c.number, slot, entry, leaf, c.before, c.matrix, c.factor, c.held, flat)
             self._names.setdefault(c.name, []).append(part)
         self._leaves.append(Leaf(slot, shape, placement, c.sag))
         self._word(LEAF, self._kinds.of(shape), join, blend, flags, slot)
@@ -550,7 +553,7 @@ class _Compiler:
             self._emit(shape, inside, PUSH, HARD, 0.0)
         self._places -= 1
         if name:
-            part = Part(number, slot, entry, -1, c.matrix, np.eye(4), factor, c.held)
+            part = Part(number, slot, entry, -1, c.matrix, np.eye(4), factor, c.held, shape.dimension == 2)
             self._names.setdefault(name, []).append(part)
         self._word(LEAVE, AFFINE, flags=flags, slot=slot)
 
