@@ -165,6 +165,7 @@ class Solid(Primitive):
     """
 
     id: ClassVar[int | None] = None
+    measured: ClassVar[bool] = True
 
 
 # --- round ---
@@ -176,6 +177,7 @@ class Sphere(Solid):
 
     code: ClassVar[str] = "sphere"
     id: ClassVar[int | None] = 0
+    places: ClassVar[tuple[str, ...] | None] = ()
     radius: float = param(1.0, SMALLEST, None, "radius", unit="m")
 
     def distance(self, p: Floats) -> Floats:
@@ -295,6 +297,7 @@ class Capsule(Solid):
 
     code: ClassVar[str] = "capsule"
     id: ClassVar[int | None] = 5
+    places: ClassVar[tuple[str, ...] | None] = ("a", "b")
     a: Vec3 = param((0.0, 0.0, -0.5), doc="one end", unit="m")
     b: Vec3 = param((0.0, 0.0, 0.5), doc="the other end", unit="m")
     radius: float = param(0.25, SMALLEST, None, "radius", unit="m")
@@ -319,6 +322,7 @@ class RoundCone(Solid):
 
     code: ClassVar[str] = "round_cone"
     id: ClassVar[int | None] = 14
+    places: ClassVar[tuple[str, ...] | None] = ("a", "b")
     a: Vec3 = param((0.0, 0.0, -0.5), doc="middle of one ball", unit="m")
     b: Vec3 = param((0.0, 0.0, 0.5), doc="middle of the other", unit="m")
     radius_a: float = param(0.5, SMALLEST, None, "radius of the ball at a", unit="m")
@@ -356,6 +360,7 @@ class Vesica(Solid):
 
     code: ClassVar[str] = "vesica"
     id: ClassVar[int | None] = 28
+    places: ClassVar[tuple[str, ...] | None] = ("a", "b")
     a: Vec3 = param((0.0, 0.0, -1.0), doc="one tip", unit="m")
     b: Vec3 = param((0.0, 0.0, 1.0), doc="the other tip", unit="m")
     width: float = param(0.5, SMALLEST, None, "radius in the middle", unit="m")
@@ -1013,6 +1018,7 @@ class CappedCone(Solid):
     """A cone with flat ends between two places."""
 
     code: ClassVar[str] = "capped_cone"
+    places: ClassVar[tuple[str, ...] | None] = ("a", "b")
     a: Vec3 = param((0.0, 0.0, -0.5), doc="middle of one end", unit="m")
     b: Vec3 = param((0.0, 0.0, 0.5), doc="middle of the other", unit="m")
     radius_a: float = param(0.5, 0, None, "radius at a", unit="m")

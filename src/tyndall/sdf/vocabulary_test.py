@@ -22,7 +22,7 @@ from tyndall.scene.model import Implicit, Material
 from tyndall.sdf import X, Y, Z
 from tyndall.sdf.modifiers import Bend, Displace, Elongate, Extrude, Mirror, Noise, Revolve, Round, Shell, Twist
 from tyndall.sdf.profiles import PROFILES
-from tyndall.sdf.program import Kinds, compile_shape
+from tyndall.sdf.program import TURNED, Kinds, compile_shape
 from tyndall.sdf.repetition import Cell, MirroredForever, Polar, Repeated, RepeatedForever, Repetition
 from tyndall.sdf.shape import MOST_DEEP, Combination, Floats, Modifier, Named, Painted, Primitive, Shape, Transformed
 from tyndall.sdf.solids import SOLIDS
@@ -205,6 +205,38 @@ def test_a_name_means_one_thing() -> None:
         if isinstance(shape, (Primitive, Modifier)):
             assert len(shape.numbers) <= 8, name
             assert all(type(x) is float for x in map(float, shape.numbers)), name
+
+
+@pytest.mark.parametrize("name", [name for name, shape in CASES.items() if isinstance(shape, Primitive)])
+def test_a_primitive_is_enlarged_and_turned_by_its_parameters(name: str) -> None:
+    shape = CASES[name]
+    assert isinstance(shape, Primitive)
+    turn = np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))[0]
+    p = places(shape, 300)
+    for matrix in (np.eye(3), turn):
+        made = shape.similar(matrix, 1.7)
+        if made is None:
+            assert matrix is turn
+            assert shape.places is None
+            continue
+        assert np.allclose(made(1.7 * p @ matrix.T), 1.7 * shape(p), rtol=1e-9, atol=1e-9)
+
+
+def test_what_is_enlarged_is_not_turned() -> None:
+    """A leaf takes transforms in where its parameters can, and has the same values; a named one keeps its own."""
+    shapes = (
+        sdf.round_cone().rotate(0.7, (1, 2, 3)).scale(1.5).at(0.1, 0.2),
+        sdf.ellipsoid().scale(0.4).at(1),
+        sdf.sphere(0.3).rotate(1).scale(3),
+    )
+    program = compile_shape(sdf.union(*shapes), Kinds())
+    assert not (program.words[:, 0] & TURNED).any()
+    for leaf, shape in zip(program.leaves, shapes, strict=True):
+        p = places(shape, 100)
+        assert program.slots[leaf.slot, 3] == pytest.approx(1)
+        assert np.allclose(leaf.shape(p - leaf.placement[:3, 3]), shape(p), atol=1e-12)
+    kept = sdf.union(sdf.sphere(0.3).scale(2).named("part"), sdf.sphere().scale((1, 1, 2)), sdf.box().rotate(1))
+    assert (compile_shape(kept, Kinds()).words[:, 0] & TURNED).all()
 
 
 # --- the device ---------------------------------------------------------------------------------------------------
