@@ -222,24 +222,22 @@ def _stone(random: np.random.Generator) -> Shape:
         high = size * random.uniform(0.24, 0.4)
         radius = 0.5 * (size**2 / high + high)  # of a ball that stands out so far, so wide
         moss.append(ball((x, ground - 0.03 + high - radius, z), radius).material(MOSS if k % 3 else MOSS_DARK))
-    return intersection(union(rock, union(*moss, smooth=0.1), smooth=0.06), box((18, 5, 13)).at(0, -1.5, 0))
+    return intersection(union(rock, union(*moss), smooth=0.07), box((18, 5, 13)).at(0, -1.5, 0))
 
 
 def _toadstool(at: Sequence[float], size: float, lean: float) -> Shape:
-    dome = egg((0, 1.0, 0), (0.62, 0.42, 0.62))
-    hollow = egg((0, 0.8, 0), (0.75, 0.22, 0.75))
+    cap = ball((0, 0.763, 0), 0.657).material(CAP) - ball((0, -1.78, 0), 2.78).material(GILLS)
     dots = []
     for k in range(9):
-        around, high = 2.4 * k, 0.35 + 0.6 * ((k * 0.618) % 1)
+        around, high = 2.4 * k, 0.45 + 0.52 * ((k * 0.618) % 1)
         flat = math.sqrt(1 - high * high)
-        dots.append(ball((0.57 * flat * math.cos(around), 0.98 + 0.4 * high, 0.57 * flat * math.sin(around)), 0.08))
+        dots.append(ball((0.62 * flat * math.cos(around), 0.763 + 0.62 * high, 0.62 * flat * math.sin(around)), 0.08))
     stem = strand([(0, -0.3, 0), (0.05, 0.4, 0), (0, 0.95, 0)], (0.2, 0.14, 0.12), 3)
     ring = torus(0.14, 0.035).orient((0, 1, 0)).at(0.02, 0.66, 0)
     return (
         union(
-            (dome - hollow).material(CAP),
+            cap,
             union(*dots).material(CREAM),
-            egg((0, 0.93, 0), (0.5, 0.09, 0.5)).material(GILLS),
             union(*stem, ring, smooth=0.03).material(CREAM),
         )
         .transform(spin(0, 0, lean))
@@ -251,8 +249,8 @@ def _toadstool(at: Sequence[float], size: float, lean: float) -> Shape:
 def _fallen_leaf() -> Shape:
     """A pointed leaf, a little bent: what two balls have in common, with its veins."""
     blade = intersection(
-        egg((0, 0, 0.62), (1.75, 0.9, 1.25)),
-        egg((0, 0, -0.62), (1.75, 0.9, 1.25)),
+        ball((0, 0, 1.52), 2.15),
+        ball((0, 0, -1.52), 2.15),
         ball((0, -4.0, 0), 4.06),
     ) - ball((0, -4.0, 0), 4.0)
     ribs = strand(
