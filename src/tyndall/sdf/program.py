@@ -36,7 +36,8 @@ and what it changes is multiplied by s at each further one. That a change be 10�
 more than 7.02 of those k above the whole, however many unions there are (fifteen, with equal shares, are the worst).
 
 Affine transforms are multiplied into the leaves below, except around what changes places by itself and around parts
-with a name, which move as one.
+with a name, which move as one. Of a leaf without a name that is then only enlarged, or round about places that are its
+parameters, parameters take them in: it is not TURNED, and has three rows less to read.
 """
 
 from __future__ import annotations
@@ -431,7 +432,9 @@ class _Compiler:
             self._depth -= 1
 
     def _leaf(self, shape: Primitive, c: _Context, join: int, blend: int, k: float) -> None:
-        placement = c.matrix if c.before is None else c.before @ c.matrix
+        placement, factor = c.matrix if c.before is None else c.before @ c.matrix, c.factor
+        if not c.name:
+            shape, placement, factor = _taken_in(shape, placement, factor)
         turned = not np.array_equal(placement[:3, :3], np.eye(3))
         flags = (TURNED if turned else 0) | (BORROWS if c.cuts and c.material is None else 0)
         numbers = [float(x) for x in shape.numbers]
@@ -443,7 +446,7 @@ class _Compiler:
             self._payload_rows.append(len(self._rows) + 1)
         margin = c.margin + min(c.shares, _MOST_WIDTHS * c.widest) if c.margin >= 0 else -1.0
         slot = self._put(
-            (*placement[:3, 3], c.factor),
+            (*placement[:3, 3], factor),
             numbers[:4],
             numbers[4:],
             (k, shape.lipschitz * c.stretch, float(self._material(c.material)), margin),
@@ -591,6 +594,20 @@ def _below_unions(c: _Context, kind: int, width: float, count: int) -> _Context:
     if kind == EXPONENTIAL:  # is k·log₂(2) below two equal values, and nothing is left of one 24 k above the other
         return replace(c, margin=c.margin + 25.0 * count * width, sag=c.sag + count * width)
     return replace(c, shares=c.shares + count * width, widest=max(c.widest, width), sag=c.sag + 0.25 * count * width)
+
+
+def _taken_in(shape: Primitive, placement: Floats, factor: float) -> tuple[Primitive, Floats, float]:
+    """The leaf, where it is and its factor, once its parameters have taken in how it is turned and enlarged."""
+    linear = placement[:3, :3]
+    if np.array_equal(linear, np.eye(3)):
+        return shape, placement, factor
+    size = float(abs(np.linalg.det(linear))) ** (1 / 3)
+    turn = linear / size
+    if np.abs(turn @ turn.T - np.eye(3)).max() > 1e-9 or (made := shape.similar(turn, size)) is None:
+        return shape, placement, factor
+    moved = np.eye(4)
+    moved[:3, 3] = placement[:3, 3]
+    return made, moved, factor / size
 
 
 def _is_leaf(shape: Shape) -> bool:
