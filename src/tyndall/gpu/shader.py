@@ -122,8 +122,8 @@ class Linker:
         Args:
             module: root module, ``package::…``.
             entries: names of the entry points to keep.
-            bindings: text of ``package::bindings``. Its ``const NAME = true;`` are switches as well, so that a shader may
-                leave out what it will not reach: the driver translates all that is there.
+            bindings: text of ``package::bindings``. Its ``const NAME = true;`` are switches as well, so that a shader
+                may leave out what it will not reach: the driver translates all that is there.
             overlay: virtual module name → real module name.
             features: switches for ``@if``.
 
