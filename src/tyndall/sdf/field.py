@@ -294,6 +294,7 @@ class Field(Closing):
         self._lists: dict[tuple[_Object, str], tuple[Buffer, Buffer]] = {}  # places and slots of many leaves of a name
         self._listed: set[tuple[_Object, str]] = set()  # whose last motion was sent as such a list
         self._waiting: set[tuple[_Object, str]] = set()  # and is not in the slots yet
+        self._jobs_written: list[list[Any]] = []  # what the jobs' buffer holds: in motion mostly what it is to hold
         self.uploaded = 0
         try:
             self._upload(implicits)
@@ -745,14 +746,18 @@ class Field(Closing):
             jobs[i] = made.jobs
         listed = [job for made in jobs.values() for job in made]
         made_of = [self._objects[i] for i, made in jobs.items() for _ in made]
-        table = np.zeros(len(listed), gpu.dtype(_JOB))
-        for number, job in enumerate(listed):
-            table[number] = job
-        gpu.write(self._job_buffer, table)
+        written = self._jobs_written
+        if [id(made) for made in jobs.values()] != [id(made) for made in written]:
+            table = np.zeros(len(listed), gpu.dtype(_JOB))
+            for number, job in enumerate(listed):
+                table[number] = job
+            gpu.write(self._job_buffer, table)
+            self._jobs_written = list(jobs.values())
         for i in dirty:
             gpu.clear_buffer(self._counter_buffer, 4 * _COUNTERS * i, 4 * _COUNTERS)
         scope = {
-            **{name: bound for name, bound in self.bindings.items() if name in ("implicit_objects", "implicit_slots")},
+            "implicit_objects": self.bindings["implicit_objects"],
+            "implicit_slots": self.bindings["implicit_slots"],
             "implicit_lists": self._list_buffer.read_write(),
             "implicit_cells": self._cell_buffer.read_write(),
             "implicit_counters": self._counter_buffer.read_write(),
