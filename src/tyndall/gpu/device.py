@@ -10,6 +10,9 @@ A pass is one expression whose name is its label, its timer and its line in ever
 bind groups and layouts are cached, so that the same expression costs little in the next frame. Passes are recorded
 into one encoder until :meth:`Gpu.submit`. Inside ``with gpu.together():`` the pipelines that are not there yet are
 built side by side, each in a thread, while what is to be recorded waits in order.
+
+A device may be used from several threads. Each records, submits and discards passes of its own, and all share what is
+cached: so what one thread prepares (:meth:`Gpu.aside`) another one finds made.
 """
 
 from __future__ import annotations
@@ -262,6 +265,28 @@ class Built:
     pipeline_ms: float
 
 
+class _Recording(threading.local):
+    """What a thread records.
+
+    Attributes:
+        labels: of the passes that are timed.
+        submitted: likewise, of the last submit.
+        timed: whether its passes are: there is one set of timers.
+    """
+
+    def __init__(self) -> None:
+        self.encoder: Any = None
+        self.chain: Any = None
+        self.labels: list[str] = []
+        self.submitted: list[str] = []
+        self.timed = True
+
+
+def _of_thread(name: str) -> Any:
+    """An attribute that is each thread's own."""
+    return property(lambda gpu: getattr(gpu._recording, name), lambda gpu, value: setattr(gpu._recording, name, value))
+
+
 class Gpu(Closing):
     """A device with its caches, ledger and timers.
 
@@ -274,6 +299,9 @@ class Gpu(Closing):
         rank: its place among the adapters that are called the same.
         built: the pipelines so far, in the order in which they were done.
     """
+
+    _encoder, _chain = _of_thread("encoder"), _of_thread("chain")
+    _labels, _submitted_labels = _of_thread("labels"), _of_thread("submitted")
 
     def __init__(self, adapter: str | None = None, *, rank: int = 0) -> None:
         alike = choose_adapters(adapter)
@@ -296,10 +324,8 @@ class Gpu(Closing):
         self._prepared: dict[Any, Any] = {}  # passes and pipelines with their groups, by all that they were made of
         self._samplers: dict[Any, Sampler] = {}
         self._constants: dict[int, Buffer] = {}
-        self._encoder: Any = None
-        self._chain: Any = None
+        self._recording = _Recording()
         self._timed = "timestamp-query" in self.features
-        self._labels: list[str] = []
         if self._timed:
             self._queries = self.device.create_query_set(type="timestamp", count=2 * _MAX_TIMED_PASSES)
             usage = wgpu.BufferUsage
@@ -314,7 +340,6 @@ class Gpu(Closing):
             self._timers = [Resource(self.ledger, "timers", native.label, size, native) for native in made]
             self._resolved, self._readback = (timer.native for timer in self._timers)
             self._period = _timestamp_period(self.device)
-        self._submitted_labels: list[str] = []
         self._passes = Passes(self._queries if self._timed else None)
 
     @property
@@ -469,7 +494,8 @@ class Gpu(Closing):
         if value not in self._constants:
             data = np.array([value, 0, 0, 0], np.uint32)
             buffer = self.buffer(f"constant {value}", data, owner="constants", element="u32", usage="uniform")
-            self._constants[value] = buffer
+            if self._constants.setdefault(value, buffer) is not buffer:  # another thread was first
+                buffer.destroy()
         return self._constants[value].uniform()
 
     def sampler(
@@ -536,10 +562,11 @@ class Gpu(Closing):
 
     def _timer(self, label: str) -> int | None:
         """The first of the two queries of a pass of this name."""
-        if not self._timed or len(self._labels) >= _MAX_TIMED_PASSES:
+        recording = self._recording
+        if not self._timed or not recording.timed or len(recording.labels) >= _MAX_TIMED_PASSES:
             return None
-        self._labels.append(label)
-        return 2 * len(self._labels) - 2
+        recording.labels.append(label)
+        return 2 * len(recording.labels) - 2
 
     def _begin_compute(self, label: str) -> Any:
         """A new pass."""
@@ -699,6 +726,15 @@ class Gpu(Closing):
             depth_read_only=depth_read_only,
         )
 
+    @contextlib.contextmanager
+    def aside(self) -> Iterator[None]:
+        """This thread's passes inside the block are not timed: the timers are those of the thread that draws."""
+        before, self._recording.timed = self._recording.timed, False
+        try:
+            yield
+        finally:
+            self._recording.timed = before
+
     def submit(self) -> None:
         """Send the recorded passes to the device."""
         self._catch_up()
@@ -845,9 +881,16 @@ class Gpu(Closing):
     def forget_groups(self) -> None:
         """Drop cached bind groups, so that destroyed resources are not kept alive by them."""
         self._prepared.clear()
-        for program in self._programs.values():
+        for program in list(self._programs.values()):  # other threads may add to them
             if isinstance(program, _Program):
                 program.groups.clear()
+
+    def forget_programs(self, slot: Slot) -> None:
+        """Drop the pipelines of all shaders that were linked with what this slot declares and tells."""
+        self._prepared.clear()
+        for key in list(self._programs):
+            if slot in key[3]:
+                self._programs.pop(key, None)
 
     # --- life -----------------------------------------------------------------------------------------------------
 

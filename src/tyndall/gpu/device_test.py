@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import threading
 from types import SimpleNamespace
 from typing import Any
 
@@ -428,3 +429,35 @@ def test_a_device_that_is_closed_waits_for_pipelines() -> None:
     assert len(own.built) <= 12
     with pytest.raises(RuntimeError, match="shutdown"):
         own._builders.submit(int)
+
+
+def test_threads_record_for_themselves_and_share_what_is_cached(gpu: Gpu) -> None:
+    """What one discards, another still submits; what one has compiled, another finds; one of them has the timers."""
+    seen: list[Any] = []
+    quick: dict[str, Any] = {"volumetric": "off", "shadow": ShadowMap(size=16), "antialiasing": "none"}
+
+    def aside() -> None:
+        with gpu.aside(), Renderer(LIT_WALL, (8, 6), gpu=gpu, **quick) as renderer:
+            assert not gpu.recording
+            renderer.draw()
+            seen.append((len(gpu._programs), gpu.timings(), renderer.radiance()))
+
+    with Renderer(LIT_WALL, (8, 6), gpu=gpu, **quick) as renderer, gpu.buffer("b", 16, owner="test") as buffer:
+        gpu.write(buffer, np.full(4, 7, np.uint32))
+        for _ in range(2):  # some passes are of a first frame
+            renderer.draw()
+        timed = [name for name, _ in gpu.timings()]
+        gpu.clear_buffer(buffer)
+        thread = threading.Thread(target=aside)
+        thread.start()
+        thread.join()
+        assert gpu.recording
+        assert (gpu.read_buffer(buffer) == 0).all()
+        renderer.draw()
+        assert [name for name, _ in gpu.timings()] == timed
+        (programs, untimed, radiance) = seen[0]
+        assert programs == len(gpu._programs)
+        assert untimed == []
+        renderer.restart()
+        renderer.draw()
+        np.testing.assert_array_equal(radiance, renderer.radiance())

@@ -35,10 +35,12 @@ from tyndall.gpu.device import ComputePass, Gpu, GpuError
 from tyndall.gpu.params import ParameterError, nearest
 from tyndall.gpu.resources import Buffer, Closing, ParamsBuffer, Resource
 from tyndall.scene.model import Implicit, Material, placement, translations
+from tyndall.sdf import paint
 from tyndall.sdf.hull import Hull
 from tyndall.sdf.marching import Marching
 from tyndall.sdf.program import TURNED, Kinds, Leaf, Part, Program, compile_shape
-from tyndall.sdf.shading import Shadings
+from tyndall.sdf.shading import ShadedMaterial, Shadings
+from tyndall.sdf.shading import validate as validate_shader
 from tyndall.sdf.shape import Box, Floats, Shape
 from tyndall.sdf.snippets import validate
 
@@ -209,6 +211,7 @@ class _Object:
     eighths: int = 0
     dirty: bool = True
     moves: dict[str, Floats] = dataclasses.field(default_factory=dict)
+    edits: dict[str, dict[str, Any]] = dataclasses.field(default_factory=dict)
     parts: dict[str, _Parts] = dataclasses.field(default_factory=dict)
     joined: dict[tuple[str, ...], _Parts] = dataclasses.field(default_factory=dict)
     turned: set[str] = dataclasses.field(default_factory=set)  # names of parts that are
@@ -220,6 +223,7 @@ class _Object:
     middles: Floats = dataclasses.field(default_factory=lambda: np.zeros((3, 0)))
 
     def __post_init__(self) -> None:
+        self.at_rest = self.implicit.shape
         self.placement = np.array(self.implicit.transform, np.float64)
         placements = np.array([leaf.placement for leaf in self.program.leaves])
         self.linear = placements[:, :3, :3].copy()  # of the leaves, and (3, leaves) where they are
@@ -232,6 +236,14 @@ class _Object:
         if names not in self.joined:
             self.joined[names] = _Parts.joined(sets)
         return self.joined[names]
+
+    def parts_of(self, name: str) -> _Parts:
+        """Its parts of a name that it has."""
+        if name not in self.parts:
+            if held := next((part.held for part in self.program.names[name] if part.held), ""):
+                raise ParameterError(f"{name}: it is inside of a {held}, which is made for where it is at rest")
+            self.parts[name] = _Parts.of(name, self.program.names[name])
+        return self.parts[name]
 
     def leaves(self) -> list[tuple[Leaf, float]]:
         """The leaves, each with what its values are multiplied by."""
@@ -265,6 +277,8 @@ class Field(Closing):
         implicits: the objects.
         marching: when a ray ends.
         pruning: False runs whole programs everywhere: slower, the same picture.
+        like: another field. Where this one has the same set of kinds, and stacks that are no deeper, its shaders are
+            the same text, whatever the order: nothing is compiled.
 
     Attributes:
         bindings: what shaders that ask the field must have in their scope.
@@ -284,10 +298,11 @@ class Field(Closing):
         marching: Marching | None = None,
         pruning: bool = True,
         owner: str = OWNER,
+        like: Field | None = None,
     ) -> None:
         self._gpu, self._owner, self._pruning = gpu, owner, pruning
         self._marching = marching or Marching()
-        self._kinds, self._shadings = Kinds(), Shadings()
+        self._kinds, self._shadings, self._stacks = Kinds(), Shadings(), (1, 1)
         self._buffers: list[Buffer] = []
         self._params: ParamsBuffer | None = None
         self._objects: list[_Object] = []
@@ -297,10 +312,37 @@ class Field(Closing):
         self._jobs_written: list[list[Any]] = []  # what the jobs' buffer holds: in motion mostly what it is to hold
         self.uploaded = 0
         try:
-            self._upload(implicits)
+            self._upload(implicits, self._compile(implicits, like))
         except BaseException:
             self.close()
             raise
+
+    def _compile(self, implicits: Sequence[Implicit], like: Field | None) -> list[Program]:
+        """The objects' programs, with kinds and shaders numbered as another field has them if the set is the same."""
+        shapes: list[Any] = [one.shape for one in implicits]
+        kinds = Kinds(like._kinds if like else None)
+        programs = [compile_shape(shape, kinds) for shape in shapes]
+        if not kinds.is_tight:
+            kinds = Kinds()
+            programs = [compile_shape(shape, kinds) for shape in shapes]
+        materials = [m for one, made in zip(implicits, programs, strict=True) for m in (one.material, *made.materials)]
+        shaders = {m.shader for m in materials if isinstance(m, ShadedMaterial)}
+        known = like._shadings if like else None
+        self._kinds, self._shadings = kinds, Shadings(known if known and shaders >= set(known.shaders) else None)
+        for material in materials:
+            self._shadings.of(material)
+        self._stacks = max([1, *(p.values for p in programs)]), max([1, *(p.places for p in programs)])
+        if (
+            like
+            and self._knows_same(like)
+            and self._stacks[0] <= like._stacks[0]
+            and self._stacks[1] <= like._stacks[1]
+        ):
+            self._stacks = like._stacks
+        return programs
+
+    def _knows_same(self, like: Field) -> bool:
+        return self._kinds.wesl() == like._kinds.wesl() and self._shadings.wesl() == like._shadings.wesl()
 
     def _buffer(self, label: str, data: NDArray[Any] | int, element: str) -> Buffer:
         size = data if isinstance(data, int) else data.nbytes
@@ -316,12 +358,11 @@ class Field(Closing):
         self._gpu.write(buffer, data, offset)
         self.uploaded += data.nbytes
 
-    def _upload(self, implicits: Sequence[Implicit]) -> None:
+    def _upload(self, implicits: Sequence[Implicit], programs: Sequence[Program]) -> None:
         gpu = self._gpu
         words = slots = materials = cells = entries = 0
-        for left, implicit in zip(range(len(implicits))[::-1], implicits, strict=True):
+        for left, implicit, program in zip(range(len(implicits))[::-1], implicits, programs, strict=True):
             shape: Any = implicit.shape
-            program = compile_shape(shape, self._kinds)
             levels = self._levels(program, shape.box, gpu.part_bytes // 16 - cells - left * _COARSE**3)
             capacity = _entries(program.size) if levels else 0
             made = _Object(implicit, program, words, slots, materials, levels, cells, 0, capacity, shape.box)
@@ -423,8 +464,8 @@ class Field(Closing):
         programs = [o.program for o in self._objects]
         constants = {
             "IMPLICIT_OBJECTS": len(programs),
-            "IMPLICIT_VALUES": max([1, *(p.values for p in programs)]),
-            "IMPLICIT_PLACES": max([1, *(p.places for p in programs)]),
+            "IMPLICIT_VALUES": self._stacks[0],
+            "IMPLICIT_PLACES": self._stacks[1],
         }
         shaded = str(not self._shadings.is_trusted).lower()
         text = "\n".join(
@@ -522,11 +563,7 @@ class Field(Closing):
         found = []
         for made in self._objects:
             if name in made.program.names:
-                if name not in made.parts:
-                    if held := next((part.held for part in made.program.names[name] if part.held), ""):
-                        raise ParameterError(f"{name}: it is inside of a {held}, which is made for where it is at rest")
-                    made.parts[name] = _Parts.of(name, made.program.names[name])
-                found.append((made, made.parts[name]))
+                found.append((made, made.parts_of(name)))
         if not found:
             known = sorted({name for made in self._objects for name in made.program.names})
             raise ParameterError(f"no part '{name}'{nearest(name, known)}")
@@ -657,30 +694,50 @@ class Field(Closing):
             ParameterError: no such name, a part that is no primitive, or a value that it does not allow.
         """
         for made, parts in self._parts(name):
-            if (parts.leaves < 0).any():
-                raise ParameterError(f"{name}: is more than one primitive, and has no parameters")
-            for index, slot in zip(parts.leaves.tolist(), parts.slots.tolist(), strict=True):
-                leaf = made.program.leaves[index]
-                unknown = [key for key in changes if key not in {f.name for f in dataclasses.fields(leaf.shape)}]
-                if unknown:
-                    raise ParameterError(f"{name}: a {type(leaf.shape).__name__} has no {unknown[0]}")
-                shape: Any = dataclasses.replace(leaf.shape, **changes)
-                if getattr(shape, "payload", None) is not None or shape.lipschitz > leaf.shape.lipschitz * (1 + 1e-9):
-                    raise ParameterError(
-                        f"{name}: a {type(shape).__name__} with samples or a greater bound is a new scene"
-                    )
-                made.program.leaves[index] = dataclasses.replace(leaf, shape=shape)
-                numbers = np.zeros(8, np.float32)
-                numbers[: len(shape.numbers)] = shape.numbers
-                at = made.first_slot + 1 + slot
-                self._slots[at + 1 : at + 3] = numbers.reshape(2, 4)
-                self._slots[at + 3, 1] *= shape.lipschitz / leaf.shape.lipschitz
-                self._write(self._slot_buffer, self._slots[at + 1 : at + 4], 16 * (at + 1))
-            made.halves = None
-            if made.program.sag < 0:  # its box is that of the whole expression
-                edited = made.shape.edited(name, changes)
-                made.implicit, made.has_hull = dataclasses.replace(made.implicit, shape=edited), False
-            made.dirty = made.moved = True
+            self._edit(made, parts, changes)
+
+    def _edit(self, made: _Object, parts: _Parts, changes: Mapping[str, Any]) -> None:
+        name = parts.name
+        if (parts.leaves < 0).any():
+            raise ParameterError(f"{name}: is more than one primitive, and has no parameters")
+        for index, slot in zip(parts.leaves.tolist(), parts.slots.tolist(), strict=True):
+            leaf = made.program.leaves[index]
+            unknown = [key for key in changes if key not in {f.name for f in dataclasses.fields(leaf.shape)}]
+            if unknown:
+                raise ParameterError(f"{name}: a {type(leaf.shape).__name__} has no {unknown[0]}")
+            shape: Any = dataclasses.replace(leaf.shape, **changes)
+            if getattr(shape, "payload", None) is not None or shape.lipschitz > leaf.shape.lipschitz * (1 + 1e-9):
+                raise ParameterError(f"{name}: a {type(shape).__name__} with samples or a greater bound is a new shape")
+            made.program.leaves[index] = dataclasses.replace(leaf, shape=shape)
+            numbers = np.zeros(8, np.float32)
+            numbers[: len(shape.numbers)] = shape.numbers
+            at = made.first_slot + 1 + slot
+            self._slots[at + 1 : at + 3] = numbers.reshape(2, 4)
+            self._slots[at + 3, 1] *= shape.lipschitz / leaf.shape.lipschitz
+            self._write(self._slot_buffer, self._slots[at + 1 : at + 4], 16 * (at + 1))
+        made.halves = None
+        made.edits.setdefault(name, {}).update(changes)
+        if made.program.sag < 0:  # its box is that of the whole expression
+            edited = made.shape.edited(name, changes)
+            made.implicit, made.has_hull = dataclasses.replace(made.implicit, shape=edited), False
+        made.dirty = made.moved = True
+
+    def carry(self, old: Field, kept: Mapping[int, int]) -> None:
+        """What was placed, moved and edited in another field is so in this one as well.
+
+        Args:
+            kept: by numbers of objects here, those of the same objects there. Where the shape is another one, its parts
+                stay at rest.
+        """
+        for index, before in kept.items():
+            made, other = self._objects[index], old._objects[before]
+            self.place(index, other.placement)
+            if made.at_rest is not other.at_rest:
+                continue
+            for name, changes in other.edits.items():
+                self._edit(made, made.parts_of(name), changes)
+            if other.moves:
+                self._move(made, [(made.parts_of(name), given) for name, given in other.moves.items()])
 
     def _jobs(self, index: int) -> list[Any]:
         """The divisions of an object, the coarse one first, each in as many parts as the marks take."""
@@ -824,3 +881,17 @@ class Field(Closing):
         self._waiting.clear()
         self._params = None
         self._gpu.forget_groups()
+
+
+def check_snippets(gpu: Gpu, implicit: Implicit) -> None:
+    """Let the driver check the types of a user's code in an object, its shapes' and its materials'.
+
+    Raises:
+        SnippetError: with the place in the user's file.
+    """
+    nodes: list[Any] = list(paint.nodes_of(implicit.shape))
+    for source in {node.source for node in nodes if getattr(node, "untrusted", False)}:
+        validate(gpu, source)
+    for material in (implicit.material, *paint.materials_of(implicit.shape)):
+        if isinstance(material, ShadedMaterial):
+            validate_shader(gpu, material.shader)

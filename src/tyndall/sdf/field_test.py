@@ -13,7 +13,7 @@ from tyndall.gpu.device import Gpu, GpuError
 from tyndall.gpu.params import ParameterError
 from tyndall.lab import field_check
 from tyndall.scene.model import Implicit, translations
-from tyndall.sdf import Grid, Shape, box, intersection, sphere, subtraction, torus, union
+from tyndall.sdf import Grid, Shape, box, cylinder, intersection, sphere, subtraction, torus, union
 from tyndall.sdf.field import Field
 from tyndall.sdf.marching import Marching
 from tyndall.sdf.shape import Blend, rotation
@@ -368,3 +368,21 @@ def test_rays_along_a_surface_end(gpu: Gpu, steps: int) -> None:
     assert dark[sure].all()
     assert not dark[flat].any()
     assert (used <= steps + 160).all()
+
+
+def test_a_field_like_another_has_its_text(gpu: Gpu) -> None:
+    """Of the same kinds in another order, and stacks no deeper; else its own, without what it does not need."""
+    deep = [Implicit(union(sphere(), box(0.4) - torus(0.5, 0.1)))]
+
+    def slot(implicits: list[Implicit], like: Field | None = None) -> object:
+        with Field(gpu, implicits, like=like) as field:
+            return field.bindings["implicit_objects"].slot
+
+    with Field(gpu, deep) as first:
+        text = first.bindings["implicit_objects"].slot
+        flat = union(torus(0.5, 0.1), box(), sphere())
+        assert slot([Implicit(flat)], first) == text != slot([Implicit(flat)])
+        for other in (sphere(), flat | cylinder(), flat - flat - (flat - flat) - ((flat - flat) - (flat - flat))):
+            made = slot([Implicit(other)], first)
+            assert made != text
+        assert slot([Implicit(sphere())], first) == slot([Implicit(sphere())])
