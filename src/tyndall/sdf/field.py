@@ -16,6 +16,10 @@ elsewhere is one buffer write, and nothing is pruned again; moving a part of it 
 four instructions or fewer need no cells, and what has no end has none: all of its program is run. Lists that do not fit
 are the parent's, and where cells of all objects do not fit some have fewer: slower, never wrong.
 
+Parts that move in one frame are best given together (:meth:`Field.move_all`): their transforms are then inverted and
+written at once. Of many leaves that are only moved the places alone are sent, a tenth of what their slots hold, and the
+device puts them into the slots.
+
 What shaders need is in :attr:`Field.bindings`: five buffers, and in the bindings module itself a switch over the kinds
 of primitives that are in use.
 """
