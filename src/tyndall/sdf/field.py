@@ -16,6 +16,10 @@ elsewhere is one buffer write, and nothing is pruned again; moving a part of it 
 four instructions or fewer need no cells, and what has no end has none: all of its program is run. Lists that do not fit
 are the parent's, and where cells of all objects do not fit some have fewer: slower, never wrong.
 
+Parts that move in one frame are best given together (:meth:`Field.move_all`): their transforms are then inverted and
+written at once. Of many leaves that are only moved the places alone are sent, a tenth of what their slots hold, and the
+device puts them into the slots.
+
 What shaders need is in :attr:`Field.bindings`: five buffers, and in the bindings module itself a switch over the kinds
 of primitives that are in use.
 """
@@ -318,6 +322,7 @@ class Field(Closing):
         self._lists: dict[tuple[_Object, str], tuple[Buffer, Buffer]] = {}  # places and slots of many leaves of a name
         self._listed: set[tuple[_Object, str]] = set()  # whose last motion was sent as such a list
         self._waiting: set[tuple[_Object, str]] = set()  # and is not in the slots yet
+        self._jobs_written: list[list[Any]] = []  # what the jobs' buffer holds: in motion mostly what it is to hold
         self.uploaded = 0
         try:
             self._upload(implicits, self._compile(implicits, like))
@@ -848,14 +853,18 @@ class Field(Closing):
             jobs[i] = made.jobs
         listed = [job for made in jobs.values() for job in made]
         made_of = [self._objects[i] for i, made in jobs.items() for _ in made]
-        table = np.zeros(len(listed), gpu.dtype(_JOB))
-        for number, job in enumerate(listed):
-            table[number] = job
-        gpu.write(self._job_buffer, table)
+        written = self._jobs_written
+        if [id(made) for made in jobs.values()] != [id(made) for made in written]:
+            table = np.zeros(len(listed), gpu.dtype(_JOB))
+            for number, job in enumerate(listed):
+                table[number] = job
+            gpu.write(self._job_buffer, table)
+            self._jobs_written = list(jobs.values())
         for i in dirty:
             gpu.clear_buffer(self._counter_buffer, 4 * _COUNTERS * i, 4 * _COUNTERS)
         scope = {
-            **{name: bound for name, bound in self.bindings.items() if name in ("implicit_objects", "implicit_slots")},
+            "implicit_objects": self.bindings["implicit_objects"],
+            "implicit_slots": self.bindings["implicit_slots"],
             "implicit_lists": self._list_buffer.read_write(),
             "implicit_cells": self._cell_buffer.read_write(),
             "implicit_counters": self._counter_buffer.read_write(),
