@@ -15,7 +15,7 @@ import copy
 import itertools
 import math
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from time import perf_counter
@@ -335,9 +335,8 @@ class Renderer(Closing):
         if self._change is not None and self._change.ready.done():
             self._follow()
         if time is not None and time != self._time and self.scene.motion:
-            for name, moves in self.scene.motion(time).items():
-                if name not in self._gone:
-                    self.move(name, moves)
+            moves = self.scene.motion(time)
+            self._move({name: moves[name] for name in moves if name not in self._gone} if self._gone else moves)
             self._time = time
         try:
             with self.gpu.together():
@@ -482,21 +481,29 @@ class Renderer(Closing):
         Raises:
             ParameterError: no such name, or what are no transforms.
         """
-        objects = self._objects(name)
-        given = moves if isinstance(moves, np.ndarray) else np.empty(0)
-        if objects or given.shape[1:] != (3,):  # ways of parts are written as they are
-            given = transforms(name, moves)
-        if len(given) < len(objects):
-            raise ParameterError(f"{name}: {len(given)} transforms for {len(objects)} objects")
-        for index, matrix in zip(objects, given, strict=False):
-            self.place(index, matrix @ np.asarray(self.scene.implicits[index].transform))
-        if self._fields and name in self._fields.parts:
-            self._fields.field.move(name, given[len(objects) :])
+        self._move({name: moves})
+
+    def _move(self, moves: Mapping[str, ArrayLike]) -> None:
+        """As :meth:`move`, of several names: their parts move together, which costs less than one after another."""
+        parts: dict[str, ArrayLike] = {}
+        for name, value in moves.items():
+            objects = self._objects(name)
+            given = value if isinstance(value, np.ndarray) else np.empty(0)
+            if objects or given.shape[1:] != (3,):  # ways of parts are written as they are
+                given = transforms(name, value)
+            if len(given) < len(objects):
+                raise ParameterError(f"{name}: {len(given)} transforms for {len(objects)} objects")
+            for index, matrix in zip(objects, given, strict=False):
+                self.place(index, matrix @ np.asarray(self.scene.implicits[index].transform))
+            if self._fields and name in self._fields.parts:
+                parts[name] = given[len(objects) :]
+            elif not objects:
+                self._unknown(name)
+            elif len(given) > len(objects):
+                raise ParameterError(f"{name}: {len(given)} transforms for {len(objects)} objects")
+        if self._fields and parts:
+            self._fields.field.move_all(parts)
             self._moved = True
-        elif not objects:
-            self._unknown(name)
-        elif len(given) > len(objects):
-            raise ParameterError(f"{name}: {len(given)} transforms for {len(objects)} objects")
 
     def edit(self, name: str, **changes: Any) -> None:
         """From the next frame on, the primitives of a name have other parameters: ``edit("ball", radius=0.3)``. Some
@@ -730,9 +737,7 @@ class Renderer(Closing):
     def _reach(self, index: int) -> None:
         """Let the scene's box hold an object where it has been placed."""
         assert self._fields is not None
-        placed: Any = self._fields.placed(index)
-        bounds = replace(self.scene.implicits[index], transform=placed).bounds
-        if bounds is not None:
+        if (bounds := self.scene.implicits[index].bounds_at(self._fields.placed(index))) is not None:
             self._hold(*bounds)
 
     def _hold(self, low: NDArray[np.float64], high: NDArray[np.float64]) -> None:
@@ -1003,6 +1008,8 @@ def pack_camera(camera: Camera, scene: Scene, size: tuple[int, int], dtype: np.d
 def shifted(row: Any, shift: tuple[float, float]) -> Any:
     """A copy of a camera's uniform whose samples lie that many pixels (right, down) of the pixels' centres."""
     moved = row.copy()
+    if not any(shift):
+        return moved
     width, height = row["size"]
     ndc = (-2 * shift[0] / width, 2 * shift[1] / height)  # the picture moves against the samples
     moved["jitter"] = ndc

@@ -106,9 +106,9 @@ class Fields:
 
     def place(self, index: int, transform: NDArray[np.float64]) -> None:
         """An object stands elsewhere from the next frame on."""
-        self._before.setdefault(index, self._placed[index])
-        self._placed[index] = transform
         self.field.place(index, transform)
+        self._before.setdefault(index, self._placed[index])
+        self._placed[index] = np.array(transform)
 
     def placed(self, index: int) -> NDArray[np.float64]:
         """4×4: where an object stands."""

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import props
 import pytest
+import wgpu
 
 from tyndall.frame import Renderer
 from tyndall.gpu import device
@@ -280,6 +281,24 @@ def test_a_line_of_more_workgroups_than_one_dimension_holds(gpu: Gpu) -> None:
             values=source.split(), doubled=target.split(write=True), count=gpu.constant(len(values))
         ).dispatch_line(len(values))
         assert (gpu.read_buffer(target) == 2 * values).all()
+        gpu.forget_groups()
+
+
+def test_a_dispatch_beyond_the_limit_is_an_error_and_the_next_frame_is_well(gpu: Gpu) -> None:
+    values = np.arange(8, dtype=np.uint32)
+    with (
+        gpu.buffer("values", values, owner="test") as source,
+        gpu.buffer("doubled", values, owner="test") as target,
+        props.module(gpu, "double_limit", _DOUBLE) as path,
+    ):
+        scope = {"values": source.split(), "doubled": target.split(write=True), "count": gpu.constant(8)}
+        prepared = gpu.compute("test.double", path).bind(scope).prepare()
+        prepared.run(1 << 20)
+        with pytest.raises(wgpu.GPUError, match="dispatch group size"):
+            gpu.submit()
+        gpu.discard()
+        prepared.run(1)
+        assert (gpu.read_buffer(target)[:8] == 3 * values).all()
         gpu.forget_groups()
 
 

@@ -6,7 +6,10 @@ Paulin, Thonat: *Lipschitz Pruning: Hierarchical Simplification of Primitive-Bas
 into 16³ cells, then each of them into 4³: 64³. A cell walks its parent's program at its centre and leaves
 out what cannot matter anywhere inside: of two joined values the one that is beyond the other by more than both can
 change. What stays is a handful of instructions, and its value in the cell is that of the whole, bit for bit up to
-rounding. Cells in which no surface can be hold no program, only the value at their centre.
+rounding. Cells in which no surface can be hold no program, only the value at their centre. Where a fine cell's program
+is still long, it is split once more, into eighths (``prune.wesl``). Below unions alone it is enough to compare every
+leaf with the least of all, which needs no walk from one instruction to the next (``unions.wesl``): so ten thousand
+primitives that all move are pruned anew in each frame.
 
 Practice. Each object (:class:`~tyndall.scene.model.Implicit`) has cells in its own space. So placing an object
 elsewhere is one buffer write, and nothing is pruned again; moving a part of it prunes that object alone. Programs of
@@ -22,6 +25,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -30,7 +34,7 @@ from numpy.typing import ArrayLike, NDArray
 from tyndall.gpu.device import ComputePass, Gpu, GpuError
 from tyndall.gpu.params import ParameterError, nearest
 from tyndall.gpu.resources import Buffer, Closing, ParamsBuffer, Resource
-from tyndall.scene.model import Implicit, Material, translations
+from tyndall.scene.model import Implicit, Material, placement, translations
 from tyndall.sdf import paint
 from tyndall.sdf.hull import Hull
 from tyndall.sdf.marching import Marching
@@ -53,6 +57,8 @@ _EIGHTHS = 512, 1 << 17, 1 << 20  # for each instruction, and at least and at mo
 _SPARE = 0.04  # of its longest side, by which an object's box grows beyond what it must hold
 _ROOMY = 1.5  # times what an object's longest side must hold, from where on it shrinks
 _LEAF_SLOTS = 7  # of a leaf with a name
+_MANY = 256  # leaves, from where on their places are sent alone, and put into their slots by the device
+_GAP = 256  # slots between two that move, for which they are written together
 _COUNTERS = 8  # of an object: entries used, overflows, words of marks used by a job, eighths used
 _LEAST_ENTRIES, _MOST_ENTRIES = 1 << 12, 1 << 23
 _AMPLE_ENTRIES = 1 << 21  # up to here twice as many for each instruction
@@ -67,7 +73,9 @@ _MOST_SLOTS = 1 << 24  # before samples, whose place is a float
 
 @dataclass(frozen=True, eq=False)
 class _Parts:
-    """The parts of one name in an object, as arrays over them; a copy of a part is one more of the same number."""
+    """The parts of a name in an object, or of several, as arrays over them; a copy of a part is one more of the same
+    number. Slots and instructions are those of the program; ``leaf_at`` are the leaves as a slice where they can be.
+    """
 
     name: str
     count: int
@@ -78,7 +86,9 @@ class _Parts:
     before: Floats
     after: Floats
     factors: Floats
-    rest: Floats
+    rest: Floats  # (3, N)
+    leaf_at: slice | NDArray[np.intp]
+    spans: tuple[tuple[int, int], ...]  # of slots, that are written when they move
     is_straight: bool
     is_in_order: bool
 
@@ -89,21 +99,78 @@ class _Parts:
 
         before, after = np.array([p.before for p in parts]), np.array([p.after for p in parts])
         linear = np.concatenate([before[:, :3, :3], after[:, :3, :3]])
-        numbers = integers(p.number for p in parts)
+        numbers, slots, leaves = (integers(getattr(p, what) for p in parts) for what in ("number", "slot", "leaf"))
         return cls(
             name,
             int(numbers.max()) + 1,
             numbers,
-            integers(p.slot for p in parts),
+            slots,
             integers(p.entry for p in parts),
-            integers(p.leaf for p in parts),
+            leaves,
             before,
             after,
             np.array([p.factor for p in parts]),
-            before[:, :3, 3] + after[:, :3, 3],
+            np.ascontiguousarray((before[:, :3, 3] + after[:, :3, 3]).T),
+            _evenly(leaves),
+            ((int(slots.min()), int(slots.max()) + _LEAF_SLOTS),),
             bool((linear == np.eye(3)).all()) and all(p.leaf >= 0 for p in parts),
             bool((numbers == np.arange(len(parts))).all()),
         )
+
+    @classmethod
+    def joined(cls, sets: Sequence[_Parts]) -> _Parts:
+        """Those of several names, one after another, to be turned at once."""
+        if len(sets) == 1:
+            return sets[0]
+        arrays = ("numbers", "slots", "entries", "leaves", "before", "after", "factors")
+        together: dict[str, Any] = {what: np.concatenate([getattr(p, what) for p in sets]) for what in arrays}
+        spans: list[tuple[int, int]] = []
+        for low, high in sorted(span for parts in sets for span in parts.spans):
+            if spans and low - spans[-1][1] <= _GAP:  # a write costs as much as that many slots
+                spans[-1] = spans[-1][0], max(high, spans[-1][1])
+            else:
+                spans.append((low, high))
+        return cls(
+            name=", ".join(parts.name for parts in sets),
+            count=sum(parts.count for parts in sets),
+            rest=np.concatenate([parts.rest for parts in sets], axis=1),
+            leaf_at=together["leaves"],
+            spans=tuple(spans),
+            is_straight=all(parts.is_straight for parts in sets),
+            is_in_order=False,
+            **together,
+        )
+
+    @cached_property
+    def first_rows(self) -> NDArray[np.float32]:
+        """(N, 4): first slots of leaves, with their factors at rest and whichever places were put into them."""
+        made = np.zeros((len(self.slots), 4), np.float32)
+        made[:, 3] = self.factors
+        return made
+
+    @cached_property
+    def owned(self) -> NDArray[np.bool_]:
+        """Which of them are one leaf, whose transform is among its own slots."""
+        return self.leaves >= 0
+
+    @cached_property
+    def own(self) -> NDArray[np.intp]:
+        """First slots of leaves."""
+        return self.slots[self.owned]
+
+    @cached_property
+    def scopes(self) -> NDArray[np.intp]:
+        """First slots of transforms around more than a leaf."""
+        return self.slots[~self.owned]
+
+
+def _evenly(numbers: NDArray[np.intp]) -> slice | NDArray[np.intp]:
+    """As a slice where they are evenly spaced: numpy copies along those many times faster."""
+    steps = np.diff(numbers)
+    step = int(steps[0]) if len(steps) else 1
+    if step < 1 or numbers[0] < 0 or (steps != step).any():
+        return numbers
+    return slice(int(numbers[0]), int(numbers[-1]) + 1, step)
 
 
 def _entries(instructions: int) -> int:
@@ -146,20 +213,31 @@ class _Object:
     moves: dict[str, Floats] = dataclasses.field(default_factory=dict)
     edits: dict[str, dict[str, Any]] = dataclasses.field(default_factory=dict)
     parts: dict[str, _Parts] = dataclasses.field(default_factory=dict)
+    joined: dict[tuple[str, ...], _Parts] = dataclasses.field(default_factory=dict)
     turned: set[str] = dataclasses.field(default_factory=set)  # names of parts that are
     moved: bool = False  # since the box was fitted
     hull: Hull | None = None
     has_hull: bool = False  # was looked for
     jobs: list[Any] | None = None
-    halves: Floats | None = None  # of the leaves' boxes in their own spaces, and their middles
-    middles: Floats = dataclasses.field(default_factory=lambda: np.zeros((0, 3)))
+    halves: Floats | None = None  # (3, leaves) of the leaves' boxes in their own spaces, and their middles
+    middles: Floats = dataclasses.field(default_factory=lambda: np.zeros((3, 0)))
 
     def __post_init__(self) -> None:
         self.at_rest = self.implicit.shape
         # An edit changes leaves, and a field of the same shapes may come to have the same program.
         self.program = dataclasses.replace(self.program, leaves=list(self.program.leaves))
-        self.placements = np.array([leaf.placement for leaf in self.program.leaves])
-        self.is_straight = bool((self.placements[:, :3, :3] == np.eye(3)).all())
+        self.placement = np.array(self.implicit.transform, np.float64)
+        placements = np.array([leaf.placement for leaf in self.program.leaves])
+        self.linear = placements[:, :3, :3].copy()  # of the leaves, and (3, leaves) where they are
+        self.places = np.ascontiguousarray(placements[:, :3, 3].T)
+        self.is_straight = bool((self.linear == np.eye(3)).all())
+
+    def together(self, sets: Sequence[_Parts]) -> _Parts:
+        """:meth:`_Parts.joined`, once for all frames."""
+        names = tuple(parts.name for parts in sets)
+        if names not in self.joined:
+            self.joined[names] = _Parts.joined(sets)
+        return self.joined[names]
 
     def parts_of(self, name: str) -> _Parts:
         """Its parts of a name that it has."""
@@ -231,6 +309,9 @@ class Field(Closing):
         self._buffers: list[Buffer] = []
         self._params: ParamsBuffer | None = None
         self._objects: list[_Object] = []
+        self._lists: dict[tuple[_Object, str], tuple[Buffer, Buffer]] = {}  # places and slots of many leaves of a name
+        self._listed: set[tuple[_Object, str]] = set()  # whose last motion was sent as such a list
+        self._waiting: set[tuple[_Object, str]] = set()  # and is not in the slots yet
         self.uploaded = 0
         try:
             self._upload(implicits, self._compile(implicits, like))
@@ -421,9 +502,8 @@ class Field(Closing):
         made, row = self._objects[index], self._rows[index]
         made.jobs = None
         program = made.program
-        placement = np.asarray(made.implicit.transform, np.float64)
-        row["to_local"] = np.linalg.inv(placement)[:3]
-        row["factor"] = np.linalg.svd(placement[:3, :3], compute_uv=False)[-1]
+        row["to_local"] = np.linalg.inv(made.placement)[:3]
+        row["factor"] = np.linalg.svd(made.placement[:3, :3], compute_uv=False)[-1]
         low, high = made.box
         longest = float(np.max(high - low)) if np.isfinite(high - low).all() else 0.0
         margin = _MARGIN * longest
@@ -447,9 +527,11 @@ class Field(Closing):
 
     def place(self, index: int, transform: Any) -> None:
         """An object stands elsewhere: one write, and nothing is pruned again."""
-        made = self._objects[index]
-        made.implicit = dataclasses.replace(made.implicit, transform=transform)
-        self._describe(index)
+        made, row = self._objects[index], self._rows[index]
+        made.placement = placement(transform)
+        row["to_local"] = np.linalg.inv(made.placement)[:3]
+        row["factor"] = np.linalg.svd(made.placement[:3, :3], compute_uv=False)[-1]
+        self._write(self._object_buffer, self._rows[index : index + 1], index * self._rows.itemsize)
 
     def move(self, name: str, matrices: ArrayLike) -> None:
         """The parts of a name are moved from where they stand at rest, in the space that holds them.
@@ -463,17 +545,27 @@ class Field(Closing):
             ParameterError: no such name, parts inside of a twist, bend or repetition without end, another number of
                 transforms, or one that has no inverse.
         """
-        given = np.asarray(matrices, np.float64)
-        sets = self._parts(name)
-        count = sum(parts.count for _, parts in sets)
-        if given.shape not in ((count, 3), (count, 4, 4)):
-            raise ParameterError(f"{name}: shape {given.shape} is neither ({count}, 4, 4) nor ({count}, 3)")
-        if not np.isfinite(given).all():
-            raise ParameterError(f"{name}: a transform is not finite")
-        first = 0
-        for made, parts in sets:
-            self._move(made, parts, given[first : first + parts.count])
-            first += parts.count
+        self.move_all({name: matrices})
+
+    def move_all(self, moves: Mapping[str, ArrayLike]) -> None:
+        """As :meth:`move`, of the parts of several names; for less than one name after another costs."""
+        wanted: dict[_Object, list[tuple[_Parts, Floats]]] = {}
+        for name, matrices in moves.items():
+            given: Floats = np.asarray(matrices)
+            if given.dtype != np.float32 or given.ndim != 2:  # ways are added as they are
+                given = np.asarray(given, np.float64)
+            sets = self._parts(name)
+            count = sum(parts.count for _, parts in sets)
+            if given.shape not in ((count, 3), (count, 4, 4)):
+                raise ParameterError(f"{name}: shape {given.shape} is neither ({count}, 4, 4) nor ({count}, 3)")
+            if not np.isfinite(given).all():
+                raise ParameterError(f"{name}: a transform is not finite")
+            first = 0
+            for made, parts in sets:
+                wanted.setdefault(made, []).append((parts, given[first : first + parts.count]))
+                first += parts.count
+        for made, listed in wanted.items():
+            self._move(made, listed)
 
     def _parts(self, name: str) -> list[tuple[_Object, _Parts]]:
         found = []
@@ -485,48 +577,79 @@ class Field(Closing):
             raise ParameterError(f"no part '{name}'{nearest(name, known)}")
         return found
 
-    def _move(self, made: _Object, parts: _Parts, given: Floats) -> None:
-        moves = given if parts.is_in_order else given[parts.numbers]
-        slots = parts.slots + (made.first_slot + 1)
-        entries = made.first_word + parts.entries
-        if moves.ndim == 2 and parts.is_straight:
-            places = parts.rest + moves
-            self._slots[slots, :3] = places
-            made.placements[parts.leaves, :3, 3] = places
-            if parts.name in made.turned:
-                made.placements[parts.leaves, :3, :3] = np.eye(3)
-                made.turned.discard(parts.name)
-                self._flag(entries, np.zeros(len(entries), bool))
-        else:
-            self._turn(made, parts, _matrices(moves), slots, entries)
-        low, high = int(slots.min()), int(slots.max()) + _LEAF_SLOTS
-        self._write(self._slot_buffer, self._slots[low:high], 16 * low)
-        made.moves[parts.name] = given
+    def _move(self, made: _Object, listed: Sequence[tuple[_Parts, Floats]]) -> None:
+        turned = []
+        for parts, given in listed:
+            moves = given if parts.is_in_order else given[parts.numbers]
+            if moves.ndim == 2 and parts.is_straight:
+                self._shift(made, parts, moves)
+            else:
+                turned.append((parts, _matrices(moves)))
+        if turned:
+            self._turn(made, made.together([parts for parts, _ in turned]), turned)
+        for parts, given in listed:
+            made.moves[parts.name] = given
         made.dirty = made.moved = True
 
-    def _turn(
-        self, made: _Object, parts: _Parts, moves: Floats, slots: NDArray[np.intp], entries: NDArray[np.intp]
-    ) -> None:
-        """Write the transforms of parts that are turned, or not leaves."""
+    def _shift(self, made: _Object, parts: _Parts, ways: Floats) -> None:
+        """Write the places of leaves that are only moved."""
+        made.places[:, parts.leaf_at] = places = parts.rest + ways.T
+        rows = parts.first_rows
+        for axis in range(3):  # one by one: numpy takes longer over many short rows
+            rows[:, axis] = places[axis]
+        whole = np.complex128  # a slot as one number
+        self._slots.view(whole)[parts.slots + (made.first_slot + 1), 0] = rows.view(whole)[:, 0]
+        if parts.name in made.turned:
+            made.linear[parts.leaves] = np.eye(3)
+            made.turned.discard(parts.name)
+            self._flag(made.first_word + parts.entries, np.zeros(len(parts.entries), bool))
+        if len(rows) < _MANY:
+            self._send(made, parts)
+            return
+        if (made, parts.name) not in self._lists:
+            numbers = (parts.slots + (made.first_slot + 1)).astype(np.uint32)
+            self._lists[made, parts.name] = (
+                self._buffer("leaf_places", rows, "vec4f"),
+                self._buffer("leaf_slots", numbers, "u32"),
+            )
+        self._write(self._lists[made, parts.name][0], rows)
+        self._listed.add((made, parts.name))
+        self._waiting.add((made, parts.name))
+
+    def _turn(self, made: _Object, parts: _Parts, listed: Sequence[tuple[_Parts, Floats]]) -> None:
+        """Write the transforms of parts that are turned, or not leaves: of the names in ``listed``, all together."""
+        moves = listed[0][1] if len(listed) == 1 else np.concatenate([moves for _, moves in listed])
         placed = parts.before @ moves @ parts.after
         stretch = _least_stretches(moves[:, :3, :3])
         if (stretch < 1e-9).any():
-            raise ParameterError(f"{parts.name}: a transform that has no inverse")
-        rows = np.linalg.inv(placed)[:, :3].astype(np.float32)
+            flat = next(one.name for one, moves in listed if (_least_stretches(moves[:, :3, :3]) < 1e-9).any())
+            raise ParameterError(f"{flat}: a transform that has no inverse")
+        rows = np.linalg.inv(placed)[:, :3]
         factors = parts.factors * stretch
-        leaves = parts.leaves >= 0
-        own, scopes = slots[leaves], slots[~leaves]
-        self._slots[own, :3] = placed[leaves, :3, 3]
-        self._slots[own, 3] = factors[leaves]
-        for row in range(3):
-            self._slots[own + 4 + row] = rows[leaves, row]
-            self._slots[scopes + row] = rows[~leaves, row]
-        self._slots[scopes + 3, 0] = factors[~leaves]
-        made.placements[parts.leaves[leaves]] = placed[leaves]
-        turned = (np.abs(placed[leaves, :3, :3] - np.eye(3)) > 1e-12).any(axis=(1, 2))
-        if turned.any() or parts.name in made.turned:
-            made.turned.add(parts.name)
-            self._flag(entries[leaves], turned)
+        for one, _ in listed:  # what is written whole must not be put back where it was
+            self._listed.discard((made, one.name))
+            self._waiting.discard((made, one.name))
+        slots, leaves = self._slots[made.first_slot + 1 :], parts.owned
+        if len(own := parts.own):
+            slots[own, :3] = placed[leaves, :3, 3]
+            slots[own, 3] = factors[leaves]
+            slots[own[:, None] + (4, 5, 6)] = rows[leaves]
+            made.linear[parts.leaves[leaves]] = placed[leaves, :3, :3]
+            made.places[:, parts.leaves[leaves]] = placed[leaves, :3, 3].T
+            turned = (np.abs(placed[leaves, :3, :3] - np.eye(3)) > 1e-12).any(axis=(1, 2))
+            names = {one.name for one, _ in listed}
+            if turned.any() or names & made.turned:
+                made.turned |= names
+                self._flag(made.first_word + parts.entries[leaves], turned)
+        if len(scopes := parts.scopes):
+            slots[scopes[:, None] + (0, 1, 2)] = rows[~leaves]
+            slots[scopes + 3, 0] = factors[~leaves]
+        self._send(made, parts)
+
+    def _send(self, made: _Object, parts: _Parts) -> None:
+        first = made.first_slot + 1
+        for low, high in parts.spans:  # whatever lies between has its newest numbers in them, too
+            self._write(self._slot_buffer, self._slots[first + low : first + high], 16 * (first + low))
 
     def _flag(self, entries: NDArray[np.intp], turned: NDArray[np.bool_]) -> None:
         """Say of leaves whether their places are turned, or only moved."""
@@ -563,15 +686,14 @@ class Field(Closing):
         """The box of all leaves, where nothing but unions is above them."""
         if made.halves is None:
             boxes = np.array([leaf.shape.extent(leaf.sag / factor) for leaf, factor in made.leaves()])
-            made.halves = 0.5 * (boxes[:, 1] - boxes[:, 0])
-            made.middles = 0.5 * (boxes[:, 1] + boxes[:, 0])
-        linear = made.placements[:, :3, :3]
+            made.halves = 0.5 * (boxes[:, 1] - boxes[:, 0]).T
+            made.middles = 0.5 * (boxes[:, 1] + boxes[:, 0]).T
         if made.is_straight and not made.turned:
-            middles, halves = made.middles + made.placements[:, :3, 3], made.halves
+            middles, halves = made.middles + made.places, made.halves
         else:
-            middles = np.einsum("nij,nj->ni", linear, made.middles) + made.placements[:, :3, 3]
-            halves = np.einsum("nij,nj->ni", np.abs(linear), made.halves)
-        return (middles - halves).min(axis=0), (middles + halves).max(axis=0)
+            middles = np.einsum("nij,jn->in", made.linear, made.middles) + made.places
+            halves = np.einsum("nij,jn->in", np.abs(made.linear), made.halves)
+        return (middles - halves).min(axis=1), (middles + halves).max(axis=1)
 
     def edit(self, name: str, **changes: Any) -> None:
         """Change parameters of the primitives of a name: ``edit("ball", radius=0.3)``. A few numbers are written.
@@ -617,13 +739,13 @@ class Field(Closing):
         """
         for index, before in kept.items():
             made, other = self._objects[index], old._objects[before]
-            self.place(index, other.implicit.transform)
+            self.place(index, other.placement)
             if made.at_rest is not other.at_rest:
                 continue
             for name, changes in other.edits.items():
                 self._edit(made, made.parts_of(name), changes)
-            for name, given in other.moves.items():
-                self._move(made, made.parts_of(name), given)
+            if other.moves:
+                self._move(made, [(made.parts_of(name), given) for name, given in other.moves.items()])
 
     def _jobs(self, index: int) -> list[Any]:
         """The divisions of an object, the coarse one first, each in as many parts as the marks take."""
@@ -659,9 +781,20 @@ class Field(Closing):
         """What was recorded is never submitted: the next :meth:`update` records it again."""
         for made in self._objects:
             made.dirty = True
+        self._waiting = set(self._listed)
+
+    def _put_in_place(self) -> None:
+        """Record that places which were sent as a list of their own come to their slots."""
+        for which in self._waiting:
+            places, slots = self._lists[which]
+            self._gpu.compute(f"{self._owner}.place", "package::sdf::places", "place").bind(
+                leaf_places=places, leaf_slots=slots, implicit_slots=self._slot_buffer.read_write()
+            ).dispatch_line(slots.size_bytes // 4)
+        self._waiting.clear()
 
     def update(self) -> None:
         """Record the pruning of what has changed, before what asks the field."""
+        self._put_in_place()
         for made in self._objects:
             if made.moved:
                 self._fit(made)
@@ -747,6 +880,9 @@ class Field(Closing):
         for resource in self.resources():
             resource.destroy()
         self._buffers.clear()
+        self._lists.clear()
+        self._listed.clear()
+        self._waiting.clear()
         self._params = None
         self._gpu.forget_groups()
 

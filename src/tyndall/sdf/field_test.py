@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from tyndall.gpu.device import Gpu, GpuError
 from tyndall.gpu.params import ParameterError
 from tyndall.lab import field_check
-from tyndall.scene.model import Implicit
+from tyndall.scene.model import Implicit, translations
 from tyndall.sdf import Grid, Shape, box, cylinder, intersection, sphere, subtraction, torus, union
 from tyndall.sdf.field import Field
 from tyndall.sdf.marching import Marching
@@ -208,6 +208,38 @@ def test_moved_parts_are_where_they_were_moved(
     for given in (turns(count, rng) if turned else rng.normal(0, 0.2, (count, 3)), np.zeros((count, 3))):
         field.move(part, given)
         agree(gpu, field, NAMES.index(name), moved(SHAPES[name], part, given))
+
+
+def test_what_was_smaller_and_is_only_moved_has_its_size_again(gpu: Gpu, field: Field) -> None:
+    """Also where the frame that was to show it failed, and after turns that came before what was sent last."""
+    count, index = 520, NAMES.index("balls")
+    ways, turned = np.random.default_rng(4).normal(0, 0.1, (count, 3)), turns(count, np.random.default_rng(6))
+    field.move("ball", np.diag([0.5, 0.5, 0.5, 1.0])[None].repeat(count, 0))
+    field.move("ball", ways)
+    field.update()
+    gpu.discard()
+    field.forget()
+    agree(gpu, field, index, moved(SHAPES["balls"], "ball", ways), 1000)
+    field.move("ball", 2 * ways)
+    field.move("ball", turned)
+    agree(gpu, field, index, moved(SHAPES["balls"], "ball", turned), 1000)
+    field.move("ball", np.zeros((count, 3)))
+
+
+def test_several_names_move_as_one_after_another(gpu: Gpu) -> None:
+    rng = np.random.default_rng(8)
+    pair = sphere(0.1).named("a").at(0.2) | box(0.2).named("b").at(-0.2)
+    group = union(torus(0.2, 0.05), sphere(0.1).at(0, 0.2), smooth=0.05).named("c").at(0, 0, 0.3)
+    shape = union(pair, group, *(sphere(0.05).at(*rng.uniform(-0.5, 0.5, 3)) for _ in range(6)), smooth=0.05)
+    given = {"a": rng.normal(0, 0.1, (1, 3)), "b": turns(1, rng), "c": turns(1, rng)}
+    there = shape.moved(
+        {name: iter(moves if moves.ndim == 3 else translations(moves)) for name, moves in given.items()}
+    )
+    with Field(gpu, [Implicit(shape)]) as field:
+        field.move_all(given)
+        agree(gpu, field, 0, there, 1000)
+        with pytest.raises(ParameterError, match="c: a transform that has no inverse"):
+            field.move_all({"b": turns(1, rng), "c": np.zeros((1, 4, 4))})
 
 
 @pytest.mark.parametrize("factor", [0.15, 2.0])

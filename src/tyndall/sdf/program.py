@@ -300,7 +300,10 @@ class Program:
 
     @cached_property
     def spans(self) -> NDArray[np.uint32]:
-        """(n, 2): of what joins two values, where the first one begins, and where the second one does."""
+        """(n, 2): of what joins two values, where the first one begins, and where the second one does.
+
+        Zeros of leaves that join nothing, and ones in all bits of what is neither a leaf nor joins.
+        """
         spans = np.zeros((len(self.words), 2), np.uint32)
         starts: list[int] = []
         entered: list[int] = []
@@ -313,10 +316,12 @@ class Program:
             elif kind == COMBINE:
                 second = starts.pop()
                 spans[i] = starts[-1], second
-            elif kind == ENTER:
-                entered.append(i)
-            elif word & PLACED:
-                starts[-1] = entered.pop()
+            else:
+                spans[i] = 0xFFFFFFFF
+                if kind == ENTER:
+                    entered.append(i)
+                elif word & PLACED:
+                    starts[-1] = entered.pop()
         return spans
 
 
