@@ -612,8 +612,10 @@ class Renderer(Closing):
         """
         wanted = self._wanted
         asked = wanted.with_(implicits=implicits, motion=motion or wanted.motion, room=room or wanted.room)
+        drawn = {id(one) for one in wanted.implicits}
         for one in asked.implicits:
-            check_snippets(self.gpu, one)
+            if id(one) not in drawn:
+                check_snippets(self.gpu, one)
         for view in self._views.values():
             view.technique.supports(asked)
         self._asked = asked

@@ -45,7 +45,7 @@ from tyndall.sdf.marching import Marching
 from tyndall.sdf.program import TURNED, Kinds, Leaf, Part, Program, compile_shape
 from tyndall.sdf.shading import ShadedMaterial, Shadings
 from tyndall.sdf.shading import validate as validate_shader
-from tyndall.sdf.shape import Box, Floats, Shape
+from tyndall.sdf.shape import Box, Floats, Painted, Shape
 from tyndall.sdf.snippets import validate
 
 OWNER = "implicit"
@@ -235,6 +235,8 @@ class _Object:
 
     def __post_init__(self) -> None:
         self.at_rest = self.implicit.shape
+        # An edit changes leaves, and a field of the same shapes may come to have the same program.
+        self.program = dataclasses.replace(self.program, leaves=list(self.program.leaves))
         self.placement = np.array(self.implicit.transform, np.float64)
         placements = np.array([leaf.placement for leaf in self.program.leaves])
         self.linear = placements[:, :3, :3].copy()  # of the leaves, and (3, leaves) where they are
@@ -314,6 +316,7 @@ class Field(Closing):
         self._gpu, self._owner, self._pruning = gpu, owner, pruning
         self._marching = marching or Marching()
         self._kinds, self._shadings, self._stacks = Kinds(), Shadings(), (1, 1)
+        self._compiled: dict[int, tuple[Any, Program]] = {}  # by the shapes' ids
         self._buffers: list[Buffer] = []
         self._params: ParamsBuffer | None = None
         self._before_buffer: Buffer | None = None  # slots as they were when `remember` was called last
@@ -333,15 +336,21 @@ class Field(Closing):
     def _compile(self, implicits: Sequence[Implicit], like: Field | None) -> list[Program]:
         """The objects' programs, with kinds and shaders numbered as another field has them if the set is the same."""
         shapes: list[Any] = [one.shape for one in implicits]
-        kinds = Kinds(like._kinds if like else None)
-        programs = [compile_shape(shape, kinds) for shape in shapes]
+        kinds, programs = Kinds(like._kinds if like else None), []
+        for shape in shapes:
+            known = like._compiled.get(id(shape)) if like else None
+            if known is None:
+                programs.append(compile_shape(shape, kinds))
+            else:
+                programs.append(known[1])
+                kinds.ask(known[1])
         if not kinds.is_tight:
-            kinds = Kinds()
-            programs = [compile_shape(shape, kinds) for shape in shapes]
+            kinds, programs = kinds.tightened(programs)
+        self._compiled = {id(shape): (shape, made) for shape, made in zip(shapes, programs, strict=True)}
         materials = [m for one, made in zip(implicits, programs, strict=True) for m in (one.material, *made.materials)]
         shaders = {m.shader for m in materials if isinstance(m, ShadedMaterial)}
-        known = like._shadings if like else None
-        self._kinds, self._shadings = kinds, Shadings(known if known and shaders >= set(known.shaders) else None)
+        others = like._shadings if like else None
+        self._kinds, self._shadings = kinds, Shadings(others if others and shaders >= set(others.shaders) else None)
         for material in materials:
             self._shadings.of(material)
         self._stacks = max([1, *(p.values for p in programs)]), max([1, *(p.places for p in programs)])
@@ -939,9 +948,13 @@ def check_snippets(gpu: Gpu, implicit: Implicit) -> None:
     Raises:
         SnippetError: with the place in the user's file.
     """
-    nodes: list[Any] = list(paint.nodes_of(implicit.shape))
-    for source in {node.source for node in nodes if getattr(node, "untrusted", False)}:
-        validate(gpu, source)
-    for material in (implicit.material, *paint.materials_of(implicit.shape)):
+    found: dict[int, Any] = {id(implicit.material): implicit.material}
+    for node in paint.nodes_of(implicit.shape):
+        if isinstance(node, Painted):
+            found.setdefault(id(node.surface), node.surface)
+        elif getattr(node, "untrusted", False):
+            source: Any = getattr(node, "source", None)
+            validate(gpu, source)
+    for material in found.values():
         if isinstance(material, ShadedMaterial):
             validate_shader(gpu, material.shader)

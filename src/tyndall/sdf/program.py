@@ -105,10 +105,29 @@ class Kinds:
             self.version += 1
         return known[key][0]
 
+    def ask(self, program: Program) -> None:
+        """Ask for all that a program has, which was compiled with these numbers."""
+        tables: tuple[Any, Any] = self._primitives, self._modifiers
+        for known, codes in zip(tables, program.codes, strict=True):
+            keys: list[Any] = list(known)
+            self._asked |= {keys[code] for code in np.unique(codes).tolist()}
+
     @property
     def is_tight(self) -> bool:
         """Whether it holds none that was never asked for."""
         return len(self._asked) == len(self._primitives) + len(self._modifiers)
+
+    def tightened(self, programs: Sequence[Program]) -> tuple[Kinds, list[Program]]:
+        """Those that were asked for alone, in the same order, and programs with their numbers."""
+        made, tables = Kinds(), []
+        for known in (self._primitives, self._modifiers):
+            each: dict[Any, tuple[int, Any]] = known
+            table = np.zeros(len(each), np.uint32)
+            for key, (code, shape) in each.items():
+                if key in self._asked:
+                    table[code] = made.of(shape)
+            tables.append(table)
+        return made, [program.renumbered(*tables) for program in programs]
 
     def sources(self) -> list[Any]:
         """The texts among them that a user wrote (:class:`~tyndall.sdf.snippets.SnippetSource`)."""
@@ -256,6 +275,26 @@ class Program:
     def size(self) -> int:
         """Instructions."""
         return len(self.words)
+
+    @property
+    def codes(self) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]:
+        """Which primitives its leaves are, and which modifiers its scopes."""
+        words = self.words[:, 0]
+        leaves, scopes = self._coded
+        low = np.uint32(0xFFFF)
+        return words[leaves] & low, words[scopes] & low
+
+    @property
+    def _coded(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        kinds, codes = self.words[:, 0] >> 16 & 0xF, self.words[:, 0] & 0xFFFF
+        return kinds == LEAF, ((kinds == ENTER) | (kinds == LEAVE)) & (codes != AFFINE)
+
+    def renumbered(self, primitives: NDArray[np.uint32], modifiers: NDArray[np.uint32]) -> Program:
+        """The same where each primitive and each modifier has another number."""
+        words = self.words.copy()
+        for table, where, codes in zip((primitives, modifiers), self._coded, self.codes, strict=True):
+            words[where, 0] = (words[where, 0] & ~np.uint32(0xFFFF)) | table[codes]
+        return replace(self, words=words)
 
     @cached_property
     def is_short_reaching(self) -> bool:
