@@ -440,6 +440,10 @@ class Implicit:
             raise ParameterError("transform: not 4×4 finite numbers that have an inverse")
         if not np.array_equal(matrix[3], (0, 0, 0, 1)):
             raise ParameterError("transform: its last row is not 0, 0, 0, 1")
+        if not isinstance(self.material, Material):
+            raise ParameterError(f"material: {self.material!r} is no Material")
+        if not isinstance(self.name, str):
+            raise ParameterError(f"name: {self.name!r} is no name")
         rows = tuple(tuple(float(x) for x in row) for row in matrix)
         object.__setattr__(self, "transform", rows)
 
@@ -477,6 +481,8 @@ class Volume:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "transform", self.surface.transform)
+        if not isinstance(self.medium, Medium):
+            raise ParameterError(f"medium: {self.medium!r} is no Medium")
         if self.surface.bounds is None:
             raise ParameterError("shape: it has no end; a volume must")
         if not 0 <= self.edge < math.inf:
