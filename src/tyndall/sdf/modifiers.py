@@ -28,8 +28,8 @@ def weakest(accuracy: Accuracy, *, outside: bool = True) -> Accuracy:
 
 
 def at_a_wall(accuracy: Accuracy, room: float) -> Accuracy:
-    """What is left of it by a mirror, or the axis of a turn, that is ``room`` away from the shape: where they touch, what
-    was a surface is none any more, and where they cross, what is left of it may be farther away."""
+    """What is left of it by a mirror, or the axis of a turn, that is ``room`` away from the shape: where they touch,
+    what was a surface is none any more, and where they cross, what is left of it may be farther away."""
     return accuracy if room > 0 else weakest(accuracy, outside=room == 0)
 
 

@@ -570,6 +570,12 @@ class Horseshoe(Profile):
         wide = max(float(ends[:, 0].max()), outer if self.angle >= math.pi / 2 else 0.0)
         return flat((-wide, float(ends[:, 1].min())), (wide, outer))
 
+    def extent(self, level: float) -> Box:
+        low, high = super().extent(level)
+        if level > 0:  # what is cut off still tells its distance
+            low[1] = min(low[1], float(self._ends[:, 1].min()) - level)
+        return low, high
+
     @cached_property
     def accuracy(self) -> Accuracy:
         return "outside" if self._ends[:, 0].min() >= 0 else "bound"  # legs that cross are cut where they do
