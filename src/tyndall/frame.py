@@ -302,7 +302,8 @@ class Renderer(Closing):
                 self.move(name, moves)
             self._time = time
         try:
-            self._record(camera or self.scene.camera, jitter, casters)
+            with self.gpu.together():
+                self._record(camera or self.scene.camera, jitter, casters)
         except BaseException:
             self.gpu.discard()  # half a frame must not precede the next one
             for view in self._views.values():

@@ -6,7 +6,10 @@ Paulin, Thonat: *Lipschitz Pruning: Hierarchical Simplification of Primitive-Bas
 into 16³ cells, then each of them into 4³: 64³. A cell walks its parent's program at its centre and leaves
 out what cannot matter anywhere inside: of two joined values the one that is beyond the other by more than both can
 change. What stays is a handful of instructions, and its value in the cell is that of the whole, bit for bit up to
-rounding. Cells in which no surface can be hold no program, only the value at their centre.
+rounding. Cells in which no surface can be hold no program, only the value at their centre. Where a fine cell's program
+is still long, it is split once more, into eighths (``prune.wesl``). Below unions alone it is enough to compare every
+leaf with the least of all, which needs no walk from one instruction to the next (``unions.wesl``): so ten thousand
+primitives that all move are pruned anew in each frame.
 
 Practice. Each object (:class:`~tyndall.scene.model.Implicit`) has cells in its own space. So placing an object
 elsewhere is one buffer write, and nothing is pruned again; moving a part of it prunes that object alone. Programs of
@@ -40,22 +43,25 @@ from tyndall.sdf.snippets import validate
 
 OWNER = "implicit"
 _OBJECT = "package::sdf::objects::ImplicitObject"
-_JOB = "package::sdf::prune::Job"
+_JOB = "package::sdf::pruning::Job"
 _MATERIAL = "package::sdf::march::FieldMaterial"
-_PRUNE = "package::sdf::prune"
+_PRUNE, _UNIONS = "package::sdf::prune", "package::sdf::unions"
 _MARGIN = 0.02  # of its longest side, around an object's box
 _DIVIDED = 4  # a program of more instructions has cells
 _COARSE, _FINE = 16, 64  # cells along the longest side, of both levels
+_SPLIT = 24  # instructions: a longer program's fine cells are split where their lists are long
+_EIGHTHS = 512, 1 << 17, 1 << 20  # for each instruction, and at least and at most
 _SPARE = 0.04  # of its longest side, by which an object's box grows beyond what it must hold
 _ROOMY = 1.5  # times what an object's longest side must hold, from where on it shrinks
 _LEAF_SLOTS = 7  # of a leaf with a name
-_COUNTERS = 8  # of an object: entries used, overflows, words of marks used at each level
+_COUNTERS = 8  # of an object: entries used, overflows, words of marks used by a job, eighths used
 _LEAST_ENTRIES, _MOST_ENTRIES = 1 << 12, 1 << 23
+_AMPLE_ENTRIES = 1 << 21  # up to here twice as many for each instruction
 _PART_SIZE = 4096  # instructions for which one part is enough
 _LONG = 96  # instructions: a longer program's leaves are sorted out first
 _LONGEST = 32 * 1024  # of those; beyond, cells walk all of it; as in prune.wesl
 _SEGMENT = 256  # of them, as in prune.wesl
-_FEW_MARKS = 128  # instructions whose marks need no memory; as in prune.wesl
+_FEW_MARKS = 512  # instructions whose marks need no memory; as in prune.wesl
 _MOST_MARKS = 1 << 23  # words
 _MOST_SLOTS = 1 << 24  # before samples, whose place is a float
 
@@ -101,6 +107,12 @@ class _Parts:
         )
 
 
+def _entries(instructions: int) -> int:
+    """How many entries lists of a program's cells may have in all: about twice what scenes were seen to need."""
+    ample = min(8192 * instructions, _AMPLE_ENTRIES)
+    return int(np.clip(max(ample, 4096 * instructions), _LEAST_ENTRIES, _MOST_ENTRIES))
+
+
 def _matrices(given: Floats) -> Floats:
     """(N, 4, 4) of transforms, or of (N, 3) ways."""
     return given if given.ndim == 3 else translations(given)
@@ -129,6 +141,8 @@ class _Object:
     first_entry: int
     capacity: int
     box: Box
+    first_eighth: int = 0
+    eighths: int = 0
     dirty: bool = True
     moves: dict[str, Floats] = dataclasses.field(default_factory=dict)
     parts: dict[str, _Parts] = dataclasses.field(default_factory=dict)
@@ -157,6 +171,16 @@ class _Object:
     @property
     def cells(self) -> int:
         return sum((_COARSE**3, _FINE**3)[: self.levels])
+
+    @property
+    def is_long(self) -> bool:
+        """Whether its leaves are sorted out before the coarse cells walk its program."""
+        return self.levels > 1 and _LONG < self.program.size <= _LONGEST
+
+    @property
+    def is_union(self) -> bool:
+        """Whether its leaves are best compared with the whole alone; the passes for that hold 32 values at most."""
+        return self.is_long and self.program.sag >= 0 and self.program.is_short_reaching and self.program.values <= 32
 
 
 class Field(Closing):
@@ -220,12 +244,18 @@ class Field(Closing):
             shape: Any = implicit.shape
             program = compile_shape(shape, self._kinds)
             levels = self._levels(program, shape.box, gpu.part_bytes // 16 - cells - left * _COARSE**3)
-            capacity = int(np.clip(4096 * program.size, _LEAST_ENTRIES, _MOST_ENTRIES)) if levels else 0
+            capacity = _entries(program.size) if levels else 0
             made = _Object(implicit, program, words, slots, materials, levels, cells, 0, capacity, shape.box)
             self._objects.append(made)
             words, slots = words + program.size, slots + len(program.slots)
             materials += 1 + len(program.materials)
             cells, entries = cells + made.cells, entries + made.capacity
+        for made in self._objects:
+            if made.levels > 1 and made.program.size > _SPLIT:
+                each, least, most = _EIGHTHS
+                wanted = min(max(each * made.program.size, least), most, gpu.part_bytes // 16 - cells)
+                made.first_eighth, made.eighths = cells, wanted // 8 * 8
+                cells += made.eighths
         room = max(0, gpu.part_bytes // 8 - words)
         if entries > room:
             for made in self._objects:
@@ -255,12 +285,12 @@ class Field(Closing):
         marks = int(np.clip(_FINE**3 * -(-(longest - _FEW_MARKS) // 16), 64, min(_MOST_MARKS, gpu.part_bytes // 4)))
         self._marks_capacity = marks
         self._mark_buffer = self._buffer("marks", 4 * marks, "u32")
-        words = max((-(-o.program.size // 32) for o in self._objects if self._is_long(o)), default=0)
+        words = max((-(-o.program.size // 32) for o in self._objects if o.is_long), default=0)
         self._alive_buffer = self._buffer("alive", 4 * max(1, _COARSE**3 * words), "u32")
         self._least_buffer = self._buffer("least", 4 * (_COARSE**3 if words else 1), "atomic<u32>")
         spans = np.zeros((max(1, self._words.shape[0]), 2), np.uint32)
         for made in self._objects:
-            if self._is_long(made):
+            if made.is_long:
                 spans[made.first_word : made.first_word + made.program.size] = made.program.spans
         self._span_buffer = self._buffer("spans", spans, "vec2u")
         most_jobs = sum(o.levels + o.program.size // _PART_SIZE for o in self._objects)
@@ -467,7 +497,7 @@ class Field(Closing):
     def _fit(self, made: _Object) -> None:
         """Let the object's box hold it where its parts are now; its cells stay as they are while they do."""
         made.moved = False
-        box = self._hull(made) if made.program.margin >= 0 else None
+        box = self._hull(made) if made.program.sag >= 0 else None
         if box is None:
             if not made.has_hull:
                 made.hull, made.has_hull = Hull.of(made.shape), True
@@ -489,8 +519,7 @@ class Field(Closing):
     def _hull(self, made: _Object) -> Box:
         """The box of all leaves, where nothing but unions is above them."""
         if made.halves is None:
-            # A smooth union takes at most a quarter of its width, of which margins count all.
-            boxes = np.array([leaf.shape.extent(0.25 * leaf.margin / factor) for leaf, factor in made.leaves()])
+            boxes = np.array([leaf.shape.extent(leaf.sag / factor) for leaf, factor in made.leaves()])
             made.halves = 0.5 * (boxes[:, 1] - boxes[:, 0])
             made.middles = 0.5 * (boxes[:, 1] + boxes[:, 0])
         linear = made.placements[:, :3, :3]
@@ -528,7 +557,7 @@ class Field(Closing):
                 self._slots[at + 3, 1] *= shape.lipschitz / leaf.shape.lipschitz
                 self._write(self._slot_buffer, self._slots[at + 1 : at + 4], 16 * (at + 1))
             made.halves = None
-            if made.program.margin < 0:  # its box is that of the whole expression
+            if made.program.sag < 0:  # its box is that of the whole expression
                 edited = made.shape.edited(name, changes)
                 made.implicit, made.has_hull = dataclasses.replace(made.implicit, shape=edited), False
             made.dirty = made.moved = True
@@ -541,7 +570,8 @@ class Field(Closing):
             scale = 4 ** (made.levels - 1 - level)
             counts = row["counts"] // scale
             blocks = int(np.prod(counts // 4))
-            parts = min(blocks, -(-made.program.size // _PART_SIZE)) if level else 1
+            in_parts = level and not made.is_union
+            parts = min(blocks, -(-made.program.size // _PART_SIZE)) if in_parts else 1
             for part in range(parts):
                 job = np.zeros((), self._gpu.dtype(_JOB))
                 job["lower"], job["width"] = row["lower"], row["cell"] * scale
@@ -552,18 +582,15 @@ class Field(Closing):
                 job["is_root"] = level == 0
                 first, end = blocks * part // parts, blocks * (part + 1) // parts
                 job["first_block"], job["block_count"] = first, end - first
-                job["is_last"] = self._is_long(made) and level == made.levels - 1 and part == parts - 1
                 job["first_entry"], job["capacity"] = made.first_entry, made.capacity
                 job["counters"] = _COUNTERS * index
                 job["marks_capacity"] = self._marks_capacity
-                job["alive_words"] = -(-made.program.size // 32) if self._is_long(made) and level == 0 else 0
-                job["margin"], job["lipschitz"] = made.program.margin, made.program.lipschitz
+                job["alive_words"] = -(-made.program.size // 32) if made.is_long and level == 0 else 0
+                job["sag"], job["lipschitz"] = made.program.sag, made.program.lipschitz
+                job["first_eighth"] = made.first_eighth
+                job["eighths"] = made.eighths if level and part == parts - 1 else 0
                 jobs.append(job)
         return jobs
-
-    def _is_long(self, made: _Object) -> bool:
-        """Whether its leaves are sorted out before the coarse cells walk its program."""
-        return made.levels > 1 and _LONG < made.program.size <= _LONGEST
 
     def forget(self) -> None:
         """What was recorded is never submitted: the next :meth:`update` records it again."""
@@ -587,12 +614,13 @@ class Field(Closing):
             made.jobs = made.jobs or self._jobs(i)
             jobs[i] = made.jobs
         listed = [job for made in jobs.values() for job in made]
+        made_of = [self._objects[i] for i, made in jobs.items() for _ in made]
         table = np.zeros(len(listed), gpu.dtype(_JOB))
         for number, job in enumerate(listed):
             table[number] = job
         gpu.write(self._job_buffer, table)
         for i in dirty:
-            gpu.encoder.clear_buffer(self._counter_buffer.native, 4 * _COUNTERS * i, 4 * _COUNTERS)
+            gpu.clear_buffer(self._counter_buffer, 4 * _COUNTERS * i, 4 * _COUNTERS)
         scope = {
             **{name: bound for name, bound in self.bindings.items() if name in ("implicit_objects", "implicit_slots")},
             "implicit_lists": self._list_buffer.read_write(),
@@ -606,7 +634,7 @@ class Field(Closing):
         }
         for number, job in enumerate(listed):
             if number:  # one job's marks are read before the next one begins
-                gpu.encoder.clear_buffer(self._counter_buffer.native, 4 * (int(job["counters"]) + 2), 4)
+                gpu.clear_buffer(self._counter_buffer, 4 * (int(job["counters"]) + 2), 4)
             here = {**scope, "implicit_job": gpu.constant(number)}
             if int(job["alive_words"]):
                 gpu.clear_buffer(self._least_buffer)
@@ -615,13 +643,16 @@ class Field(Closing):
                 self._pass("find_alive", here).dispatch(*size)
                 self._pass("emit_alive", here).dispatch_line(64 * int(np.prod(job["counts"])))
                 continue
-            self._pass("prune", here).dispatch_line(64 * int(job["block_count"]))
-            if job["is_last"]:
-                self._pass("refine", here).dispatch_line(int(np.prod(job["counts"])))
+            is_fine_union = not job["is_root"] and made_of[number].is_union
+            self._pass("prune_union" if is_fine_union else "prune", here).dispatch_line(64 * int(job["block_count"]))
+            if int(job["eighths"]):
+                self._pass("split", here).dispatch_line(8 * int(np.prod(job["counts"])))
 
     def _pass(self, entry: str, scope: Mapping[str, Any]) -> ComputePass:
-        shared = self._gpu.adapter_info["adapter_type"] != "CPU"  # see prune.wesl
-        return self._gpu.compute(f"{self._owner}.{entry}", _PRUNE, entry).bind(scope).features(shared_loads=shared)
+        # See pruning.wesl. Those that split cells have a list of their own each.
+        shared = self._gpu.adapter_info["adapter_type"] != "CPU" and entry != "split"
+        module = _PRUNE if entry in ("prune", "split") else _UNIONS
+        return self._gpu.compute(f"{self._owner}.{entry}", module, entry).bind(scope).features(shared_loads=shared)
 
     def counters(self) -> NDArray[np.uint32]:
         """(objects, 2): entries of lists that pruning used, or wanted, and cells that had to keep their parent's.

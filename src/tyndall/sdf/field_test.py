@@ -54,7 +54,7 @@ def shapes() -> dict[str, Shape]:
         "nest": tree(rng, 32),
         **{blend: union(*(leaf(rng) for _ in range(16)), smooth=0.1, blend=blend) for blend in BLENDS},
         "balls": union(
-            *(sphere(0.06).at(*rng.uniform((-2, -0.4, -0.4), (2, 0.4, 0.4))).named("ball") for _ in range(300))
+            *(sphere(0.05).at(*rng.uniform((-2, -0.4, -0.4), (2, 0.4, 0.4))).named("ball") for _ in range(520))
         ),
         "copies": bead.repeat((0.7, 0.5, 0), (5, 2, 1)),
         "forever": union(wave, sphere(0.2).at(0, 0.4), torus(0.3, 0.1).at(1), box(0.2).at(-1, 0.3)),
@@ -109,7 +109,7 @@ def test_a_million_places(gpu: Gpu, field: Field) -> None:
 
 
 def test_lists_are_short(gpu: Gpu, field: Field) -> None:
-    """Of 300 balls a cell near the surface keeps a few: less than four a cell, all lists together."""
+    """Of 520 balls a cell near the surface keeps a few: less than four a cell, all lists together."""
     field.update()
     used, overflows = field.counters()[NAMES.index("balls")]
     assert 0 < used < 4 * 64**3 / 4
@@ -125,15 +125,17 @@ def test_lists_are_short(gpu: Gpu, field: Field) -> None:
         ({"_LEAST_ENTRIES": 64, "_MOST_ENTRIES": 64}, True),
         ({"_LEAST_ENTRIES": 3000, "_MOST_ENTRIES": 3000}, True),
         ({"_MOST_MARKS": 64, "_LONG": 1 << 20}, True),
+        ({"_EIGHTHS": (0, 0, 0)}, False),
+        ({"_EIGHTHS": (64, 64, 64)}, False),
         ({"_LONG": 20}, False),
         ({"_LONG": 20, "_LEAST_ENTRIES": 3000, "_MOST_ENTRIES": 3000}, True),
     ],
-    ids=["no-lists", "few-lists", "no-marks", "long", "long-few-lists"],
+    ids=["no-lists", "few-lists", "no-marks", "no-eighths", "few-eighths", "long", "long-few-lists"],
 )
 def test_other_ways_say_the_same(
     gpu: Gpu, monkeypatch: pytest.MonkeyPatch, constants: dict[str, int], overflows: bool
 ) -> None:
-    """Lists or marks that do not fit make cells slower, not wrong; nor does sorting out leaves first."""
+    """Lists, marks or eighths that do not fit make cells slower, not wrong; nor does sorting out leaves first."""
     for name, value in constants.items():
         monkeypatch.setattr(f"tyndall.sdf.field.{name}", value)
     with Field(gpu, IMPLICITS) as field:
@@ -196,7 +198,7 @@ def turns(count: int, rng: np.random.Generator) -> NDArray[np.float64]:
     return made
 
 
-@pytest.mark.parametrize(("name", "part", "count"), [("balls", "ball", 300), ("copies", "bead", 1)])
+@pytest.mark.parametrize(("name", "part", "count"), [("balls", "ball", 520), ("copies", "bead", 1)])
 @pytest.mark.parametrize("turned", [False, True])
 def test_moved_parts_are_where_they_were_moved(
     gpu: Gpu, field: Field, name: str, part: str, count: int, turned: bool
@@ -273,12 +275,12 @@ def test_an_object_is_placed_by_one_short_write(gpu: Gpu, field: Field) -> None:
 def test_what_cannot_be_moved(gpu: Gpu, field: Field) -> None:
     with pytest.raises(ParameterError, match="no part 'bal'.*ball"):
         field.move("bal", np.zeros((1, 3)))
-    with pytest.raises(ParameterError, match="300"):
+    with pytest.raises(ParameterError, match="520"):
         field.move("ball", np.zeros((2, 3)))
     with pytest.raises(ParameterError, match="not finite"):
-        field.move("ball", np.full((300, 3), np.nan))
+        field.move("ball", np.full((520, 3), np.nan))
     with pytest.raises(ParameterError, match="no inverse"):
-        field.move("ball", np.zeros((300, 4, 4)))
+        field.move("ball", np.zeros((520, 4, 4)))
     with pytest.raises(ParameterError, match="has no width"):
         field.edit("bead", width=1)
 
