@@ -132,6 +132,9 @@ def _head(document: Document) -> str:
         f"{width}×{height} pixels; {frame}; medians over {_span(runs, 'seconds')} s of frames, "
         f"{_span(runs, 'loop_seconds')} s of the plain loop's.",
     ]
+    if document["adapter_type"] == "CPU":
+        lines += ["", "A software adapter may stamp the beginning of a frame's only pass late: the compute loop can seem "
+                  "to take no time at all."]  # fmt: skip
     if len(runs) > 1:
         told = [
             f"{', '.join(PARTS[part] for part in run['parts']) or 'nothing'} ({run['settings']['seconds']:g} s)"
@@ -166,7 +169,7 @@ def _goals(document: Document) -> str:
 
     def per_second(what: str, row: Row, state: str, wanted: float) -> None:
         if figures := row.get("ours", {}).get(state):
-            goal(what, f"{figures['fps']:,.0f}", f"≥ {wanted:g}", figures["fps"] >= wanted)
+            goal(what, _fps(figures), f"≥ {wanted:g}", figures["fps"] >= wanted)
         elif "still" not in row.get("ours", {}):
             goal(what, "not measured", f"≥ {wanted:g}", None)
 
@@ -298,8 +301,7 @@ def _figures(ours: Row, wanted: float, states: Sequence[str] = _STATES) -> list[
         return [_short(ours), *"–––––"]
     both = [ours.get(state) for state in _STATES]
     fps = [
-        "–" if not found else f"**{found['fps']:,.0f}**" if found["fps"] < wanted and state in states
-        else f"{found['fps']:,.0f}"
+        "–" if not found else f"**{_fps(found)}**" if found["fps"] < wanted and state in states else _fps(found)
         for state, found in zip(_STATES, both, strict=True)
     ]  # fmt: skip
     hosts = [_ms(found["host_ms"]["median"] if found else None) for found in both]
@@ -313,7 +315,7 @@ def _why_slow(row: Row) -> Iterator[str]:
         if not figures or figures["fps"] >= GOALS["scene_fps"]:
             continue
         gpu, host = figures["frame_ms"]["median"], figures["host_ms"]["median"]
-        begin = f"`{row['scene']}`, {state}, {figures['fps']:,.0f}"
+        begin = f"`{row['scene']}`, {state}, {_fps(figures)}"
         if host > gpu:
             yield f"{begin}: waits for the host, {_ms(host)} ms a frame; the GPU takes {_ms(gpu)}"
         else:
@@ -523,6 +525,10 @@ def _ms(ms: float | None, digits: int | None = None) -> str:
     if digits is None:
         digits = 3 if ms < 1 else 2 if ms < 100 else 0
     return f"{ms:,.{digits}f}"
+
+
+def _fps(figures: Row) -> str:
+    return f"{figures['fps']:,.{0 if figures['fps'] >= 10 else 1}f}"
 
 
 def _loop(found: Row | None) -> str:

@@ -1,4 +1,4 @@
-"""A stage for what comes without one: camera, ground, light and air around the contents of a mesh file.
+"""A stage for what comes without one: camera, ground, light and air around a mesh file, a mesh or a shape.
 
 Everything is in proportion to the object's radius r, half the diagonal of its bounding box, so that a bunny of 15 cm
 and a part of 80 "metres" (an STL in millimetres) give the same picture:
