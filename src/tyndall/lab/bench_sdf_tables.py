@@ -133,8 +133,8 @@ def _head(document: Document) -> str:
         f"{_span(runs, 'loop_seconds')} s of the plain loop's.",
     ]
     if document["adapter_type"] == "CPU":
-        lines += ["", "A software adapter may stamp the beginning of a frame's only pass late: the compute loop can seem "
-                  "to take no time at all."]  # fmt: skip
+        late = "A software adapter may stamp the beginning of a frame's only pass late"
+        lines += ["", f"{late}: the compute loop can seem to take no time at all."]
     if len(runs) > 1:
         told = [
             f"{', '.join(PARTS[part] for part in run['parts']) or 'nothing'} ({run['settings']['seconds']:g} s)"

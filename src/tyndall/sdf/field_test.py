@@ -247,9 +247,9 @@ def test_an_edit_that_is_wrong_for_one_part_changes_none(gpu: Gpu) -> None:
         with pytest.raises(ParameterError, match="part: a Cuboid has no radius"):
             field.edit("part", radius=0.2)
         agree(gpu, field, 0, shape, 1000)
-    with Field(gpu, [Implicit(box(0.5).named("part"))]) as field:
-        with pytest.raises(ParameterError, match="did you mean 'size'"):
-            field.edit("part", sizes=0.2)
+    near = pytest.raises(ParameterError, match="did you mean 'size'")
+    with Field(gpu, [Implicit(box(0.5).named("part"))]) as field, near:
+        field.edit("part", sizes=0.2)
 
 
 def test_an_edited_part_below_other_than_unions_has_room(gpu: Gpu) -> None:
