@@ -25,10 +25,10 @@ after each figure. ``quick`` measures the same things in small.
 from __future__ import annotations
 
 import dataclasses
-import json
 import os
 import time
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from datetime import date
 from functools import partial
@@ -39,12 +39,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tyndall.frame import Renderer
-from tyndall.gpu.device import Gpu, GpuError
+from tyndall.gpu.device import Gpu
 from tyndall.gpu.params import ParameterError, nearest
 from tyndall.lab import bench_sdf_tables as tables
 from tyndall.lab import s5
 from tyndall.lab.busy import Busy
 from tyndall.lab.field_check import agreement
+from tyndall.lab.figures import Figures, text_of, timed_device
 from tyndall.lab.fingerprint import scene_hash, versions
 from tyndall.lab.first_picture import Order, in_a_process, run, techniques_of
 from tyndall.lab.measure import Times, measure
@@ -69,6 +70,7 @@ CHANGES: Mapping[str, Mapping[str, Any]] = {"field": {"cones": 1}, "field_ao": {
 BATCH = 32  # frames between two waits, where frames per second are counted
 STEP = 1 / 60  # s of a scene's own time from frame to frame
 _MOST_LITERAL = 2000  # primitives; a compiler has no end with more
+_TURN = 20.0  # s that a loop takes at most, beside its measurement, when it is its turn to draw
 
 Progress = Callable[[float, str], object]
 Row = dict[str, Any]
@@ -118,33 +120,14 @@ QUICK = Settings(
 )
 
 
-@dataclass(frozen=True)
-class SdfBench:
-    """The figures of one run, as plain data (:meth:`to_json`) and as tables (:meth:`markdown`)."""
+class SdfBench(Figures):
+    """The figures of one run."""
 
-    document: Mapping[str, Any]
-
-    def to_json(self) -> dict[str, Any]:
-        """Ready for ``json.dumps``."""
-        return dict(self.document)
+    name = NAME
 
     def markdown(self) -> str:
         """All tables, as they stand in ``docs/benchmarks.md``."""
         return tables.markdown(self.document)
-
-    def __str__(self) -> str:
-        return self.markdown()
-
-    def save(self, folder: str | os.PathLike[str]) -> Path:
-        """Write ``sdf.json`` and ``sdf.md``.
-
-        Raises:
-            OutputError: ``folder`` is a file, or the system refuses.
-        """
-        target = Path(folder)
-        text = json.dumps(self.document, indent=1, ensure_ascii=False) + "\n"
-        write_texts(target, {f"{NAME}.json": text, f"{NAME}.md": self.markdown()})
-        return target
 
 
 def sdf(
@@ -179,16 +162,9 @@ def sdf(
             raise ParameterError(f"parts: no part '{part}'{nearest(part, PARTS)} (there are {', '.join(PARTS)})")
     if out is not None:
         check_folder(Path(out))
-    own = not isinstance(adapter, Gpu)
-    gpu = adapter if isinstance(adapter, Gpu) else Gpu(adapter)
-    try:
-        if "timestamp-query" not in gpu.features:
-            raise GpuError("this adapter cannot time what it draws (timestamp-query), and a benchmark is of times")
+    with timed_device(adapter) as gpu:
         work = _Run(gpu, chosen, Path(out) if out is not None else None, progress)
         work.all()
-    finally:
-        if own:
-            gpu.close()
     bench = SdfBench(work.document)
     if out is not None:
         bench.save(out)
@@ -289,18 +265,43 @@ class _Run:
 
     def _loops(self) -> None:
         s = self._s
-        swarms = [f"swarm:{count}" for count in s.swarm]
-        codes = [f"swarm:{count}" for count in s.swarm if count <= _MOST_LITERAL]
-        for part, names in (("swarm", swarms), ("scenes", s.scenes), ("swarm", codes)):
-            listed = names is swarms
-            for name in names:
-                for stage in ("fragment", "compute"):
-                    self._loop(part, Order(name, stage, loops=listed))
-        for count in s.swarm:
-            if count > _MOST_LITERAL:
-                for stage in ("fragment", "compute"):
-                    reason = f"not tried: {count:,} as code"
-                    self._row("swarm", f"swarm:{count}").setdefault("loop", {})[stage] = {"failed": reason}
+        stages = ("fragment", "compute")
+        swarms = [("swarm", f"swarm:{count}") for count in s.swarm]
+        literal = [(p, n) for p, n in swarms if int(n.partition(":")[2]) <= _MOST_LITERAL]
+        codes = [
+            (p, self._sized(Order(n, w))) for p, n in [*(("scenes", n) for n in s.scenes), *literal] for w in stages
+        ]
+        limit = s.timeout + (s.loop_seconds + _TURN) * len(codes)
+        # Literal code takes a compiler of one thread minutes: all of it at once, while nothing else is measured.
+        with ThreadPoolExecutor(max(1, (os.cpu_count() or 1) - 1)) as pool:
+            begun: dict[Future[Row], tuple[str, Order]] = {}
+            for part, order in codes if s.processes else ():
+                begun[pool.submit(in_a_process, order, timeout=limit, keep_compiled=False)] = part, order
+            self._progress(self._done / self._planned, f"compiling {len(begun)} loops at once")
+            for future in as_completed(begun):
+                self._loop(*begun[future], future)
+        for part, order in () if s.processes else codes:
+            self._loop(part, order)
+        for part, name in swarms:
+            for stage in stages:
+                self._loop(part, self._sized(Order(name, stage, loops=True)))
+        for part, name in swarms:
+            if (part, name) not in literal:
+                for stage in stages:
+                    reason = f"not tried: {name.partition(':')[2]} primitives as code"
+                    self._row(part, name).setdefault("loop", {})[stage] = {"failed": reason}
+
+    def _sized(self, order: Order) -> Order:
+        s = self._s
+        return dataclasses.replace(
+            order,
+            size=s.size,
+            seconds=s.loop_seconds,
+            frames=s.frames,
+            adapter=self.document["adapter"],
+            patience=s.timeout if s.processes and not order.loops else 0.0,
+            in_turn=not order.loops,
+        )
 
     def _row(self, part: str, name: str) -> Row:
         """The row of a scene, anew or as it is so far."""
@@ -355,19 +356,14 @@ class _Run:
             "frames": taken.frames,
         }
 
-    def _loop(self, part: str, order: Order) -> None:
-        s, name = self._s, order.scene
-        order = dataclasses.replace(
-            order, size=s.size, seconds=s.loop_seconds, frames=s.frames, adapter=self.document["adapter"]
-        )
+    def _loop(self, part: str, order: Order, begun: Future[Row] | None = None) -> None:
+        name = order.scene
         row = self._row(part, name)
 
         def found() -> Row:
             scene = self._scene(name)
             row.update(facts(scene))
-            if s.processes and not order.loops:
-                return in_a_process(order, timeout=s.timeout, keep_compiled=False)
-            return run(order, self._gpu, scene)
+            return begun.result() if begun is not None else run(order, self._gpu, scene)
 
         text = f"{name} as {'a list' if order.loops else 'code'}, {order.who}"
         self._step(text)
@@ -496,8 +492,7 @@ class _Run:
 
     def _save(self) -> None:
         if self._out is not None:
-            text = json.dumps(self.document, indent=1, ensure_ascii=False) + "\n"
-            write_texts(self._out, {f"{NAME}.json": text})
+            write_texts(self._out, {f"{NAME}.json": text_of(self.document)})
 
 
 def _told(name: str) -> str:

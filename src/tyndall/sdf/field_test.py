@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from tyndall.gpu.device import Gpu, GpuError
 from tyndall.gpu.params import ParameterError
 from tyndall.lab import field_check
-from tyndall.scene.model import Implicit
-from tyndall.sdf import Grid, Shape, box, intersection, sphere, subtraction, torus, union
+from tyndall.scene.model import Implicit, translations
+from tyndall.sdf import Grid, Shape, box, circle, cylinder, intersection, rectangle, sphere, subtraction, torus, union
 from tyndall.sdf.field import Field
 from tyndall.sdf.marching import Marching
 from tyndall.sdf.shape import Blend, rotation
@@ -54,7 +54,7 @@ def shapes() -> dict[str, Shape]:
         "nest": tree(rng, 32),
         **{blend: union(*(leaf(rng) for _ in range(16)), smooth=0.1, blend=blend) for blend in BLENDS},
         "balls": union(
-            *(sphere(0.06).at(*rng.uniform((-2, -0.4, -0.4), (2, 0.4, 0.4))).named("ball") for _ in range(300))
+            *(sphere(0.05).at(*rng.uniform((-2, -0.4, -0.4), (2, 0.4, 0.4))).named("ball") for _ in range(520))
         ),
         "copies": bead.repeat((0.7, 0.5, 0), (5, 2, 1)),
         "forever": union(wave, sphere(0.2).at(0, 0.4), torus(0.3, 0.1).at(1), box(0.2).at(-1, 0.3)),
@@ -109,7 +109,7 @@ def test_a_million_places(gpu: Gpu, field: Field) -> None:
 
 
 def test_lists_are_short(gpu: Gpu, field: Field) -> None:
-    """Of 300 balls a cell near the surface keeps a few: less than four a cell, all lists together."""
+    """Of 520 balls a cell near the surface keeps a few: less than four a cell, all lists together."""
     field.update()
     used, overflows = field.counters()[NAMES.index("balls")]
     assert 0 < used < 4 * 64**3 / 4
@@ -125,15 +125,17 @@ def test_lists_are_short(gpu: Gpu, field: Field) -> None:
         ({"_LEAST_ENTRIES": 64, "_MOST_ENTRIES": 64}, True),
         ({"_LEAST_ENTRIES": 3000, "_MOST_ENTRIES": 3000}, True),
         ({"_MOST_MARKS": 64, "_LONG": 1 << 20}, True),
+        ({"_EIGHTHS": (0, 0, 0)}, False),
+        ({"_EIGHTHS": (64, 64, 64)}, False),
         ({"_LONG": 20}, False),
         ({"_LONG": 20, "_LEAST_ENTRIES": 3000, "_MOST_ENTRIES": 3000}, True),
     ],
-    ids=["no-lists", "few-lists", "no-marks", "long", "long-few-lists"],
+    ids=["no-lists", "few-lists", "no-marks", "no-eighths", "few-eighths", "long", "long-few-lists"],
 )
 def test_other_ways_say_the_same(
     gpu: Gpu, monkeypatch: pytest.MonkeyPatch, constants: dict[str, int], overflows: bool
 ) -> None:
-    """Lists or marks that do not fit make cells slower, not wrong; nor does sorting out leaves first."""
+    """Lists, marks or eighths that do not fit make cells slower, not wrong; nor does sorting out leaves first."""
     for name, value in constants.items():
         monkeypatch.setattr(f"tyndall.sdf.field.{name}", value)
     with Field(gpu, IMPLICITS) as field:
@@ -196,7 +198,7 @@ def turns(count: int, rng: np.random.Generator) -> NDArray[np.float64]:
     return made
 
 
-@pytest.mark.parametrize(("name", "part", "count"), [("balls", "ball", 300), ("copies", "bead", 1)])
+@pytest.mark.parametrize(("name", "part", "count"), [("balls", "ball", 520), ("copies", "bead", 1)])
 @pytest.mark.parametrize("turned", [False, True])
 def test_moved_parts_are_where_they_were_moved(
     gpu: Gpu, field: Field, name: str, part: str, count: int, turned: bool
@@ -206,6 +208,38 @@ def test_moved_parts_are_where_they_were_moved(
     for given in (turns(count, rng) if turned else rng.normal(0, 0.2, (count, 3)), np.zeros((count, 3))):
         field.move(part, given)
         agree(gpu, field, NAMES.index(name), moved(SHAPES[name], part, given))
+
+
+def test_what_was_smaller_and_is_only_moved_has_its_size_again(gpu: Gpu, field: Field) -> None:
+    """Also where the frame that was to show it failed, and after turns that came before what was sent last."""
+    count, index = 520, NAMES.index("balls")
+    ways, turned = np.random.default_rng(4).normal(0, 0.1, (count, 3)), turns(count, np.random.default_rng(6))
+    field.move("ball", np.diag([0.5, 0.5, 0.5, 1.0])[None].repeat(count, 0))
+    field.move("ball", ways)
+    field.update()
+    gpu.discard()
+    field.forget()
+    agree(gpu, field, index, moved(SHAPES["balls"], "ball", ways), 1000)
+    field.move("ball", 2 * ways)
+    field.move("ball", turned)
+    agree(gpu, field, index, moved(SHAPES["balls"], "ball", turned), 1000)
+    field.move("ball", np.zeros((count, 3)))
+
+
+def test_several_names_move_as_one_after_another(gpu: Gpu) -> None:
+    rng = np.random.default_rng(8)
+    pair = sphere(0.1).named("a").at(0.2) | box(0.2).named("b").at(-0.2)
+    group = union(torus(0.2, 0.05), sphere(0.1).at(0, 0.2), smooth=0.05).named("c").at(0, 0, 0.3)
+    shape = union(pair, group, *(sphere(0.05).at(*rng.uniform(-0.5, 0.5, 3)) for _ in range(6)), smooth=0.05)
+    given = {"a": rng.normal(0, 0.1, (1, 3)), "b": turns(1, rng), "c": turns(1, rng)}
+    there = shape.moved(
+        {name: iter(moves if moves.ndim == 3 else translations(moves)) for name, moves in given.items()}
+    )
+    with Field(gpu, [Implicit(shape)]) as field:
+        field.move_all(given)
+        agree(gpu, field, 0, there, 1000)
+        with pytest.raises(ParameterError, match="c: a transform that has no inverse"):
+            field.move_all({"b": turns(1, rng), "c": np.zeros((1, 4, 4))})
 
 
 @pytest.mark.parametrize("factor", [0.15, 2.0])
@@ -220,6 +254,22 @@ def test_scaled_parts_are_pruned_by_their_new_slopes(gpu: Gpu, factor: float) ->
         for name in ("outer", "inner"):
             field.move(name, scale)
         agree(gpu, field, 0, shape.moved({"outer": iter(scale), "inner": iter(scale)}))
+
+
+def test_a_flat_part_is_moved_within_its_plane(gpu: Gpu) -> None:
+    """What is done across the plane changes no distance in it; out of the plane it cannot go."""
+    one, two = rectangle((0.3, 0.2)).named("flat"), union(rectangle((0.3, 0.2)), circle(0.1).at(0.2)).named("flat")
+    shape = one.rotate(0.4).at(0.3, 0.1).extrude(0.5) | union(two.at(0.4), circle(0.2).at(0.6)).revolve().at(2)
+    shallow, wide = np.diag([0.8, 0.6, 0.1, 1]), rotation(0.5, (0, 0, 1)) @ np.diag([1.5, 2.0, 9.0, 1])
+    wide[:3, 3] = 0.2, -0.1, 0.3
+    with Field(gpu, [Implicit(shape)]) as field:
+        for matrix in (shallow, wide):
+            given = np.stack([matrix, matrix])
+            field.move("flat", given)
+            agree(gpu, field, 0, moved(shape, "flat", given), 2000)
+        for out, said in ((rotation(0.1, (1, 0, 0)), "out of the plane"), (np.diag([1.0, 1, 0, 1]), "no inverse")):
+            with pytest.raises(ParameterError, match=f"flat: .*{said}"):
+                field.move("flat", np.stack([np.eye(4), out]))
 
 
 def test_an_edited_part_below_other_than_unions_has_room(gpu: Gpu) -> None:
@@ -273,12 +323,12 @@ def test_an_object_is_placed_by_one_short_write(gpu: Gpu, field: Field) -> None:
 def test_what_cannot_be_moved(gpu: Gpu, field: Field) -> None:
     with pytest.raises(ParameterError, match="no part 'bal'.*ball"):
         field.move("bal", np.zeros((1, 3)))
-    with pytest.raises(ParameterError, match="300"):
+    with pytest.raises(ParameterError, match="520"):
         field.move("ball", np.zeros((2, 3)))
     with pytest.raises(ParameterError, match="not finite"):
-        field.move("ball", np.full((300, 3), np.nan))
+        field.move("ball", np.full((520, 3), np.nan))
     with pytest.raises(ParameterError, match="no inverse"):
-        field.move("ball", np.zeros((300, 4, 4)))
+        field.move("ball", np.zeros((520, 4, 4)))
     with pytest.raises(ParameterError, match="has no width"):
         field.edit("bead", width=1)
 
@@ -334,3 +384,21 @@ def test_rays_along_a_surface_end(gpu: Gpu, steps: int) -> None:
     assert dark[sure].all()
     assert not dark[flat].any()
     assert (used <= steps + 160).all()
+
+
+def test_a_field_like_another_has_its_text(gpu: Gpu) -> None:
+    """Of the same kinds in another order, and stacks no deeper; else its own, without what it does not need."""
+    deep = [Implicit(union(sphere(), box(0.4) - torus(0.5, 0.1)))]
+
+    def slot(implicits: list[Implicit], like: Field | None = None) -> object:
+        with Field(gpu, implicits, like=like) as field:
+            return field.bindings["implicit_objects"].slot
+
+    with Field(gpu, deep) as first:
+        text = first.bindings["implicit_objects"].slot
+        flat = union(torus(0.5, 0.1), box(), sphere())
+        assert slot([Implicit(flat)], first) == text != slot([Implicit(flat)])
+        for other in (sphere(), flat | cylinder(), flat - flat - (flat - flat) - ((flat - flat) - (flat - flat))):
+            made = slot([Implicit(other)], first)
+            assert made != text
+        assert slot([Implicit(sphere())], first) == slot([Implicit(sphere())])

@@ -30,7 +30,10 @@ between the two add.
 
 A leaf that only unions lie above has a *margin* ≥ 0, others −1: where its value is above that of the whole by more than
 the margin, it does not matter. A smooth union of width k is at least a − k where a still matters, so the margin is the
-sum of k over the unions above (and what takes its place for the other blends).
+sum of k over the unions above (and what takes its place for the other blends). But where a is so high above one of
+them, hardly anything of it is left for the next: if its share there is s, of 0 … 1, it is k·(1 − s)² above their union,
+and what it changes is multiplied by s at each further one. That a change be 10⁻⁸ of the widest k at least, it can be no
+more than 7.02 of those k above the whole, however many unions there are (fifteen, with equal shares, are the worst).
 
 Affine transforms are multiplied into the leaves below, except around what changes places by itself and around parts
 with a name, which move as one. Of a leaf without a name that is then only enlarged, or round about places that are its
@@ -73,28 +76,58 @@ AFFINE = 0xFFFF
 _JOINS: dict[Operation, int] = {"union": UNION, "intersection": INTERSECT, "subtraction": SUBTRACT}
 _BLENDS = {"polynomial": POLYNOMIAL, "exponential": EXPONENTIAL, "root": ROOT}
 _MOST_NODES = 1 << 20
+_MOST_WIDTHS = 7.02  # of smooth unions, by which a leaf that matters is above the whole: see above
 
 
 class Kinds:
     """The primitives and modifiers of some programs, numbered as their first instructions come.
 
+    Args:
+        like: others, whose numbers it begins with.
+
     Attributes:
         version: grows with every new one: shaders that know fewer must be made anew.
     """
 
-    def __init__(self) -> None:
-        self._primitives: dict[Any, tuple[int, Primitive]] = {}
-        self._modifiers: dict[Any, tuple[int, Modifier]] = {}
-        self.version = 0
+    def __init__(self, like: Kinds | None = None) -> None:
+        self._primitives: dict[Any, tuple[int, Primitive]] = dict(like._primitives) if like else {}
+        self._modifiers: dict[Any, tuple[int, Modifier]] = dict(like._modifiers) if like else {}
+        self._asked: set[Any] = set()
+        self.version: int = like.version if like else 0
 
     def of(self, shape: Primitive | Modifier) -> int:
         """Its number; the same for all whose WESL is the same."""
         known: dict[Any, tuple[int, Any]] = self._primitives if isinstance(shape, Primitive) else self._modifiers
         key = _source(shape)
+        self._asked.add(key)
         if key not in known:
             known[key] = len(known), shape
             self.version += 1
         return known[key][0]
+
+    def ask(self, program: Program) -> None:
+        """Ask for all that a program has, which was compiled with these numbers."""
+        tables: tuple[Any, Any] = self._primitives, self._modifiers
+        for known, codes in zip(tables, program.codes, strict=True):
+            keys: list[Any] = list(known)
+            self._asked |= {keys[code] for code in np.unique(codes).tolist()}
+
+    @property
+    def is_tight(self) -> bool:
+        """Whether it holds none that was never asked for."""
+        return len(self._asked) == len(self._primitives) + len(self._modifiers)
+
+    def tightened(self, programs: Sequence[Program]) -> tuple[Kinds, list[Program]]:
+        """Those that were asked for alone, in the same order, and programs with their numbers."""
+        made, tables = Kinds(), []
+        for known in (self._primitives, self._modifiers):
+            each: dict[Any, tuple[int, Any]] = known
+            table = np.zeros(len(each), np.uint32)
+            for key, (code, shape) in each.items():
+                if key in self._asked:
+                    table[code] = made.of(shape)
+            tables.append(table)
+        return made, [program.renumbered(*tables) for program in programs]
 
     def sources(self) -> list[Any]:
         """The texts among them that a user wrote (:class:`~tyndall.sdf.snippets.SnippetSource`)."""
@@ -183,6 +216,7 @@ class Part:
         before, after: 4×4, from its parent's space to the object's (or the scope's), and from its own to its parent's.
         factor: distances at rest, of the leaf or the transform.
         held: what is around it whose numbers follow from where it is at rest, so that it cannot move; "" for nothing.
+        flat: it is a shape in the plane, and stays in it.
     """
 
     number: int
@@ -193,16 +227,17 @@ class Part:
     after: Floats
     factor: float
     held: str = ""
+    flat: bool = False
 
 
 @dataclass(frozen=True, eq=False)
 class Leaf:
-    """A leaf of a program: where its numbers are, what it is, and from where it is placed."""
+    """A leaf of a program: where its numbers are, what it is, its placement, and how far unions can be below it."""
 
     slot: int
     shape: Primitive
     placement: Floats
-    margin: float
+    sag: float
 
 
 @dataclass(eq=False)
@@ -219,7 +254,7 @@ class Program:
         places: the deepest stack of places.
         lipschitz: L of the whole.
         material_rows: slots whose third number is a material's, or −1.
-        margin: by how much the whole can be below its least leaf; −1 where not all leaves have a margin.
+        sag: by how much the whole can be below its least leaf; −1 where not all leaves have a margin.
         payload_rows: slots whose first number is that of another slot, where samples begin.
     """
 
@@ -234,16 +269,44 @@ class Program:
     material_rows: NDArray[np.intp]
     payload_rows: NDArray[np.intp]
 
-    margin: float = -1.0
+    sag: float = -1.0
 
     @property
     def size(self) -> int:
         """Instructions."""
         return len(self.words)
 
+    @property
+    def codes(self) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]:
+        """Which primitives its leaves are, and which modifiers its scopes."""
+        words = self.words[:, 0]
+        leaves, scopes = self._coded
+        low = np.uint32(0xFFFF)
+        return words[leaves] & low, words[scopes] & low
+
+    @property
+    def _coded(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        kinds, codes = self.words[:, 0] >> 16 & 0xF, self.words[:, 0] & 0xFFFF
+        return kinds == LEAF, ((kinds == ENTER) | (kinds == LEAVE)) & (codes != AFFINE)
+
+    def renumbered(self, primitives: NDArray[np.uint32], modifiers: NDArray[np.uint32]) -> Program:
+        """The same where each primitive and each modifier has another number."""
+        words = self.words.copy()
+        for table, where, codes in zip((primitives, modifiers), self._coded, self.codes, strict=True):
+            words[where, 0] = (words[where, 0] & ~np.uint32(0xFFFF)) | table[codes]
+        return replace(self, words=words)
+
+    @cached_property
+    def is_short_reaching(self) -> bool:
+        """Whether what joins values is hard or polynomial: others reach many times their widths."""
+        return bool((self.words[:, 0] >> 24 & 3 <= POLYNOMIAL).all())
+
     @cached_property
     def spans(self) -> NDArray[np.uint32]:
-        """(n, 2): of what joins two values, where the first one begins, and where the second one does."""
+        """(n, 2): of what joins two values, where the first one begins, and where the second one does.
+
+        Zeros of leaves that join nothing, and ones in all bits of what is neither a leaf nor joins.
+        """
         spans = np.zeros((len(self.words), 2), np.uint32)
         starts: list[int] = []
         entered: list[int] = []
@@ -256,10 +319,12 @@ class Program:
             elif kind == COMBINE:
                 second = starts.pop()
                 spans[i] = starts[-1], second
-            elif kind == ENTER:
-                entered.append(i)
-            elif word & PLACED:
-                starts[-1] = entered.pop()
+            else:
+                spans[i] = 0xFFFFFFFF
+                if kind == ENTER:
+                    entered.append(i)
+                elif word & PLACED:
+                    starts[-1] = entered.pop()
         return spans
 
 
@@ -283,7 +348,10 @@ class _Context:
     stretch: float = 1.0
     name: str = ""
     before: Floats | None = None  # of the name: the transform around it
-    margin: float = 0.0
+    margin: float = 0.0  # of exponential unions above; −1: others than unions are
+    shares: float = 0.0  # sum of the widths of the polynomial ones above
+    widest: float = 0.0  # of those
+    sag: float = 0.0
     order: Mapping[str, int] = field(default_factory=dict)  # of the names, the next part's number
     number: int = 0  # of the part that the name is for
     held: str = ""  # as a part's
@@ -306,7 +374,7 @@ class _Compiler:
         self._depth = self._places = self._deepest = self._most_places = 0
         self._material_rows: list[int] = []
         self._payload_rows: list[int] = []
-        self._margins: list[float] = []
+        self._sags: list[float] = []
 
     def compile(self, shape: Shape) -> Program:
         if shape.dimension != 3:
@@ -325,7 +393,7 @@ class _Compiler:
             shape.lipschitz,
             np.array(self._material_rows, np.intp),
             np.array(self._payload_rows, np.intp),
-            max(self._margins) if min(self._margins) >= 0 else -1.0,
+            max(self._sags) if min(self._sags) >= 0 else -1.0,
         )
 
     # A node leaves one value: pushed, or joined to the value before it where ``join`` is not PUSH.
@@ -415,21 +483,23 @@ class _Compiler:
         if (payload := _payload(shape)) is not None:
             numbers[0] = float(self._payload(payload))
             self._payload_rows.append(len(self._rows) + 1)
+        margin = c.margin + min(c.shares, _MOST_WIDTHS * c.widest) if c.margin >= 0 else -1.0
         slot = self._put(
             (*placement[:3, 3], factor),
             numbers[:4],
             numbers[4:],
-            (k, shape.lipschitz * c.stretch, float(self._material(c.material)), c.margin),
+            (k, shape.lipschitz * c.stretch, float(self._material(c.material)), margin),
         )
         self._material_rows.append(slot + 3)
-        self._margins.append(c.margin)
+        self._sags.append(c.sag if c.margin >= 0 else -1.0)
         if turned or c.name:
             self._put(*np.linalg.inv(placement)[:3])
         if c.name:
             assert c.before is not None
-            part = Part(c.number, slot, len(self._words), len(self._leaves), c.before, c.matrix, c.factor, c.held)
+            entry, leaf, flat = len(self._words), len(self._leaves), shape.dimension == 2
+            part = Part(c.number, slot, entry, leaf, c.before, c.matrix, c.factor, c.held, flat)
             self._names.setdefault(c.name, []).append(part)
-        self._leaves.append(Leaf(slot, shape, placement, c.margin))
+        self._leaves.append(Leaf(slot, shape, placement, c.sag))
         self._word(LEAF, self._kinds.of(shape), join, blend, flags, slot)
         if join == PUSH:
             self._pushed()
@@ -481,21 +551,25 @@ class _Compiler:
                 self._emit(child, inside, inner if i else PUSH, HARD, 0.0)
         self._join(join, blend, k, lipschitz)
 
-    def _pairs(self, children: list[tuple[Shape, _Context]], inner: int, kind: int, width: float) -> None:
-        """Smooth joins of neighbours by pairs, as :meth:`Combination.distance` takes them."""
+    def _pairs(
+        self, children: list[tuple[Shape, _Context]], inner: int, kind: int, width: float, above: int = 0
+    ) -> None:
+        """Smooth joins of neighbours by pairs, as :meth:`Combination.distance` takes them; ``above``: joins of the same
+        kind around them.
+        """
         if len(children) == 1:
-            self._emit(*children[0], PUSH, HARD, 0.0)
+            child, c = children[0]
+            self._emit(child, _below_unions(c, kind, width, above), PUSH, HARD, 0.0)
             return
-        if children[0][1].margin >= 0:
-            more = width * (25.0 if kind == EXPONENTIAL else 1.0)
-            children = [(child, replace(c, margin=c.margin + more)) for child, c in children]
+        above += 1
         # Pairing from the left gives a first half of a power of two.
         half = 1 << (len(children) - 1).bit_length() - 1
-        self._pairs(children[:half], inner, kind, width)
+        self._pairs(children[:half], inner, kind, width, above)
         if len(children) - half == 1:
-            self._emit(*children[half], inner, kind, width)
+            child, c = children[half]
+            self._emit(child, _below_unions(c, kind, width, above), inner, kind, width)
         else:
-            self._pairs(children[half:], inner, kind, width)
+            self._pairs(children[half:], inner, kind, width, above)
             self._join(inner, kind, width, max(child.lipschitz * c.stretch for child, c in children))
 
     def _scope(
@@ -521,7 +595,7 @@ class _Compiler:
             self._emit(shape, inside, PUSH, HARD, 0.0)
         self._places -= 1
         if name:
-            part = Part(number, slot, entry, -1, c.matrix, np.eye(4), factor, c.held)
+            part = Part(number, slot, entry, -1, c.matrix, np.eye(4), factor, c.held, shape.dimension == 2)
             self._names.setdefault(name, []).append(part)
         self._word(LEAVE, AFFINE, flags=flags, slot=slot)
 
@@ -550,6 +624,15 @@ class _Compiler:
             self._places -= 1
         if shape.warps or shape.adjusts:
             self._word(LEAVE, code, flags=PLACED if shape.warps else 0, slot=slot)
+
+
+def _below_unions(c: _Context, kind: int, width: float, count: int) -> _Context:
+    """What is around a part of that many smooth unions, each in the next."""
+    if c.margin < 0 or count == 0:
+        return c
+    if kind == EXPONENTIAL:  # is k·log₂(2) below two equal values, and nothing is left of one 24 k above the other
+        return replace(c, margin=c.margin + 25.0 * count * width, sag=c.sag + count * width)
+    return replace(c, shares=c.shares + count * width, widest=max(c.widest, width), sag=c.sag + 0.25 * count * width)
 
 
 def _taken_in(shape: Primitive, placement: Floats, factor: float) -> tuple[Primitive, Floats, float]:

@@ -164,12 +164,52 @@ def test_what_cuts_keeps_the_material_of_what_is_cut() -> None:
 
 
 def test_margins() -> None:
-    """Of unions alone: the sum of the widths above; none where anything else is above a leaf."""
-    assert compiled(sphere() | box()).margin == 0
-    assert compiled(union(sphere(), box(), smooth=0.25)).margin >= 0.25
-    assert compiled(sphere() & box()).margin == -1
-    assert compiled(sphere() - box()).margin == -1
-    assert compiled((sphere() | box()).shell(0.1)).margin == -1
+    """Of unions alone: the sum of the widths above, or as much as can matter; none where anything else is above a
+    leaf.
+    """
+
+    def margins(shape: Shape) -> list[float]:
+        program = compiled(shape)
+        return [float(program.slots[leaf.slot + 3, 3]) for leaf in program.leaves]
+
+    assert margins(union(sphere(), union(box(), torus(), smooth=0.5), smooth=0.25)) == [0.25, 0.75, 0.75]
+    assert margins(union(*(sphere(i) for i in range(1, 1025)), smooth=0.5)) == pytest.approx([3.51] * 1024)
+    assert margins(union(sphere(), box(), smooth=0.25, blend="exponential")) == [6.25, 6.25]
+    assert margins(sphere() - box()) == [-1, -1]
+
+
+def test_a_leaf_above_its_margin_changes_nothing() -> None:
+    """The worst of leaves with equal shares at each of n unions, against what is left of it at the top."""
+    k, change = 0.5, 1e-8
+    for n in (1, 4, 15, 40):
+        share = change ** (1 / (n + 1))  # the leaf's own union has it twice
+        above = n * k * (1 - share) ** 2
+        assert above <= 7.02 * k
+        rest = np.zeros(n)  # values beside it, lowest at the top
+        value = above
+        for i in range(n):
+            rest[i] = value - k * (1 - 2 * share)
+            value -= k * (1 - share) ** 2
+        with_it, without = above, rest[0]
+        for i in range(n):
+            with_it = smooth_least(with_it, rest[i], k)
+            without = smooth_least(without, rest[i], k) if i else without
+        assert with_it == pytest.approx(0, abs=1e-12)
+        assert 0.5 * change * k < without - with_it < 1.001 * change * k
+
+
+def smooth_least(a: float, b: float, k: float) -> float:
+    return min(a, b) - 0.25 * k * (max(k - abs(a - b), 0) / k) ** 2
+
+
+def test_sags() -> None:
+    """How far the whole is below its least leaf: a quarter of each polynomial width, all of an exponential one."""
+    assert compiled(sphere() | box()).sag == 0
+    assert compiled(union(sphere(), box(), smooth=0.25)).sag == 0.0625
+    assert compiled(union(sphere(), box(), smooth=0.25, blend="exponential")).sag == 0.25
+    assert compiled(sphere() & box()).sag == -1
+    assert compiled(sphere() - box()).sag == -1
+    assert compiled((sphere() | box()).shell(0.1)).sag == -1
 
 
 def test_kinds_are_numbered_as_they_come() -> None:
@@ -182,6 +222,31 @@ def test_kinds_are_numbered_as_they_come() -> None:
     assert kinds.version == 3
     assert kinds.is_trusted
     assert [kinds.of(shape) for shape in (sphere(3), box(2), torus())] == [0, 1, 2]
+
+
+def test_kinds_keep_the_numbers_of_others() -> None:
+    """The same set is the same text in whatever order; whether all are in use is known."""
+    first = Kinds()
+    compile_shape(sphere() | box().twist(0.1), first)
+    same = Kinds(first)
+    assert not same.is_tight
+    compile_shape(box() | sphere().twist(0.3), same)
+    assert same.is_tight
+    assert (same.version, same.wesl()) == (first.version, first.wesl())
+    fewer = Kinds(first)
+    program = compile_shape(torus() | (box() & torus()).twist(0.2), fewer)
+    assert not fewer.is_tight
+    tight, (renumbered,) = fewer.tightened([program])
+    assert tight.is_tight
+    assert [tight.of(shape) for shape in (box(), torus())] == [0, 1]
+    alone = Kinds()
+    compile_shape(box(), alone)
+    np.testing.assert_array_equal(renumbered.words, compile_shape(torus() | (box() & torus()).twist(0.2), alone).words)
+    again = Kinds(tight)
+    again.ask(renumbered)
+    assert again.is_tight
+    compile_shape(torus(), same)
+    assert (same.version, first.version) == (4, 3), "the others are as they were"
 
 
 def test_refused(monkeypatch: pytest.MonkeyPatch) -> None:
