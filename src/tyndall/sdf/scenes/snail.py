@@ -21,7 +21,7 @@ from tyndall.sdf.solids import box, torus
 VIEWER = (1.9, 2.35, 9.2)
 SUN = (0.46, -0.66, -0.50)
 WHORL = 0.47  # of the size a turn further out
-TURNS = 3.3
+TURNS = 3.1
 PIECES = 16  # of the outermost turn; smaller turns have fewer
 SHELL = (-0.5, 1.72, 0.0)  # m, middle of the shell
 
@@ -84,8 +84,9 @@ def _shell() -> Shape:
         shade = min(len(BANDS) - 1, int(len(BANDS) * (1 - turns[i] / TURNS)))
         piece = limb(centres[i], centres[i + 1], float(radii[i]), float(radii[i + 1]))
         tube.append(piece.material(BANDS[shade]))
+    tube.append(ball((0, 0, centres[-1, 2]), 0.08).material(BANDS[0]))
     stripes: list[Shape] = []
-    for lift, size, last in ((0.5, 0.105, 1.9), (-0.25, 0.07, 1.2), (1.05, 0.07, 1.9)):
+    for lift, size, last in ((0.5, 0.105, 1.7), (-0.25, 0.07, 1.2), (1.05, 0.07, 1.7)):
         along = _along(0.02, last)
         middle, radius, outward = whorl(along)
         way = math.cos(lift) * outward + math.sin(lift) * np.array([0, 0, 1.0])
@@ -98,7 +99,18 @@ def _shell() -> Shape:
     forward = (math.sin(0.95), math.cos(0.95), 0.0)
     lip = torus(float(wide[0]) * 0.97, 0.075).orient(forward).at(*mouth[0]).material(LIP)
     whole = union(union(*tube, smooth=0.03), union(*stripes).material(STRIPE), lip, smooth=0.02)
-    return whole.transform(POSE)
+    drops = []
+    for turn, lift, size in (
+        (0.19, 0.7, 0.07),
+        (0.3, 1.0, 0.055),
+        (0.42, 0.5, 0.08),
+        (1.24, 0.9, 0.05),
+        (0.08, 0.8, 0.05),
+    ):
+        middle, radius, outward = whorl([turn])
+        way = math.cos(lift) * outward[0] + math.sin(lift) * np.array([0, 0, 1.0])
+        drops.append(ball(POSE[:3, :3] @ (middle[0] + radius[0] * way) + POSE[:3, 3], size))
+    return union(whole.transform(POSE), union(*drops).material(DEW))
 
 
 def _skin(random: np.random.Generator) -> Shape:
@@ -165,34 +177,34 @@ def _feeler(side: int) -> Shape:
     return union(*strand(path, (0.07, 0.045), 2), ball(path[-1], 0.06), smooth=0.03).material(PALE)
 
 
-def creature(random: np.random.Generator) -> Shape:
-    """The snail; parts ``left eye`` and ``right eye``."""
-    eyes = [_stalk(-1 if name == "left eye" else 1).at(*at).named(name) for name, at in EYES.items()]
+def _body(random: np.random.Generator) -> Shape:
+    """The snail without its shell and its eyes, which stand in collars."""
+    collars = [ball(at, 0.125).material(SKIN) for at in EYES.values()]
     smile = strand([(3.14, 1.12, 0.28), (3.24, 1.09, 0.07), (3.14, 1.14, -0.12)], (0.018, 0.022, 0.018), 3)
-    body = union(_skin(random), *eyes, _feeler(1), _feeler(-1), smooth=0.05)
-    drops = []
-    for turn, lift, size in (
-        (0.19, 0.7, 0.07),
-        (0.3, 1.0, 0.055),
-        (0.42, 0.5, 0.08),
-        (1.24, 0.9, 0.05),
-        (0.08, 0.8, 0.05),
-    ):
-        middle, radius, outward = whorl([turn])
-        way = math.cos(lift) * outward[0] + math.sin(lift) * np.array([0, 0, 1.0])
-        drops.append(ball(POSE[:3, :3] @ (middle[0] + radius[0] * way) + POSE[:3, 3], size))
-    return union(body, _shell(), union(*smile).material(EYE), union(*drops).material(DEW))
+    return union(union(_skin(random), *collars, _feeler(1), _feeler(-1), smooth=0.05), union(*smile).material(EYE))
+
+
+def creature(random: np.random.Generator) -> tuple[Implicit, ...]:
+    """The snail, in parts that move by themselves: so nothing is pruned again for them."""
+    eyes = (
+        Implicit(_stalk(-1 if name == "left eye" else 1).at(*EYES[name]), material=SKIN, name=name) for name in EYES
+    )
+    return (
+        Implicit(_body(random), material=SKIN, name="snail"),
+        Implicit(_shell(), material=BANDS[0], name="shell"),
+        *eyes,
+    )
 
 
 def motion(time: float) -> Mapping[str, ArrayLike]:
     """Matrices of the snail and its eyes at a time in seconds: it creeps to and fro, and looks around."""
     place = np.eye(4)
     place[0, 3] = 0.35 * math.sin(0.4 * time)
-    result: dict[str, ArrayLike] = {"snail": place}
+    result: dict[str, ArrayLike] = {"snail": place, "shell": place}
     for side, (name, at) in zip((-1, 1), EYES.items(), strict=True):
         sway = 9 * math.sin(1.3 * time + 0.7 * side) - 9 * math.sin(0.7 * side)
         nod = 8 * math.sin(0.9 * time + 1.1 * side) - 8 * math.sin(1.1 * side)
-        result[name] = about(at, spin(sway, 0, nod))
+        result[name] = place @ about(at, spin(sway, 0, nod))
     return result
 
 
@@ -346,7 +358,7 @@ def snail(*, lights: int = 1, seed: int = 0) -> Scene:
     random = np.random.default_rng(options.seed)
     return Scene(
         implicits=(
-            Implicit(creature(random), material=SKIN, name="snail"),
+            *creature(random),
             Implicit(_stone(random), material=STONE, name="stone"),
             Implicit(_garden(random), material=GREEN, name="garden"),
             Implicit(nearer(_distance(random), VIEWER, 0.55), material=GLOW[0], name="distance"),
