@@ -10,6 +10,9 @@ A pass is one expression whose name is its label, its timer and its line in ever
 bind groups and layouts are cached, so that the same expression costs little in the next frame. Passes are recorded
 into one encoder until :meth:`Gpu.submit`. Inside ``with gpu.together():`` the pipelines that are not there yet are
 built side by side, each in a thread, while what is to be recorded waits in order.
+
+A device may be used from several threads. Each records, submits and discards passes of its own, and all share what is
+cached: so what one thread prepares (:meth:`Gpu.aside`) another one finds made.
 """
 
 from __future__ import annotations
@@ -33,6 +36,7 @@ from numpy.typing import NDArray
 
 from tyndall.gpu import driver_types
 from tyndall.gpu import params as declared
+from tyndall.gpu.passes import Passes
 from tyndall.gpu.resources import (
     BYTES_PER_TEXEL,
     Bound,
@@ -261,6 +265,28 @@ class Built:
     pipeline_ms: float
 
 
+class _Recording(threading.local):
+    """What a thread records.
+
+    Attributes:
+        labels: of the passes that are timed.
+        submitted: likewise, of the last submit.
+        timed: whether its passes are: there is one set of timers.
+    """
+
+    def __init__(self) -> None:
+        self.encoder: Any = None
+        self.chain: Any = None
+        self.labels: list[str] = []
+        self.submitted: list[str] = []
+        self.timed = True
+
+
+def _of_thread(name: str) -> Any:
+    """An attribute that is each thread's own."""
+    return property(lambda gpu: getattr(gpu._recording, name), lambda gpu, value: setattr(gpu._recording, name, value))
+
+
 class Gpu(Closing):
     """A device with its caches, ledger and timers.
 
@@ -273,6 +299,9 @@ class Gpu(Closing):
         rank: its place among the adapters that are called the same.
         built: the pipelines so far, in the order in which they were done.
     """
+
+    _encoder, _chain = _of_thread("encoder"), _of_thread("chain")
+    _labels, _submitted_labels = _of_thread("labels"), _of_thread("submitted")
 
     def __init__(self, adapter: str | None = None, *, rank: int = 0) -> None:
         alike = choose_adapters(adapter)
@@ -295,10 +324,8 @@ class Gpu(Closing):
         self._prepared: dict[Any, Any] = {}  # passes and pipelines with their groups, by all that they were made of
         self._samplers: dict[Any, Sampler] = {}
         self._constants: dict[int, Buffer] = {}
-        self._encoder: Any = None
-        self._chain: Any = None
+        self._recording = _Recording()
         self._timed = "timestamp-query" in self.features
-        self._labels: list[str] = []
         if self._timed:
             self._queries = self.device.create_query_set(type="timestamp", count=2 * _MAX_TIMED_PASSES)
             usage = wgpu.BufferUsage
@@ -313,7 +340,7 @@ class Gpu(Closing):
             self._timers = [Resource(self.ledger, "timers", native.label, size, native) for native in made]
             self._resolved, self._readback = (timer.native for timer in self._timers)
             self._period = _timestamp_period(self.device)
-        self._submitted_labels: list[str] = []
+        self._passes = Passes(self._queries if self._timed else None)
 
     @property
     def depth_format(self) -> str:
@@ -467,7 +494,8 @@ class Gpu(Closing):
         if value not in self._constants:
             data = np.array([value, 0, 0, 0], np.uint32)
             buffer = self.buffer(f"constant {value}", data, owner="constants", element="u32", usage="uniform")
-            self._constants[value] = buffer
+            if self._constants.setdefault(value, buffer) is not buffer:  # another thread was first
+                buffer.destroy()
         return self._constants[value].uniform()
 
     def sampler(
@@ -524,15 +552,25 @@ class Gpu(Closing):
 
     def timestamps(self, label: str) -> dict[str, Any] | None:
         """Timestamp writes for a pass of this name; None where the adapter has no timers or too many passes ran."""
-        if not self._timed or len(self._labels) >= _MAX_TIMED_PASSES:
+        if (slot := self._timer(label)) is None:
             return None
-        slot = 2 * len(self._labels)
-        self._labels.append(label)
         return {
             "query_set": self._queries,
             "beginning_of_pass_write_index": slot,
             "end_of_pass_write_index": slot + 1,
         }
+
+    def _timer(self, label: str) -> int | None:
+        """The first of the two queries of a pass of this name."""
+        if not self._timed or not self._recording.timed or len(self._labels) >= _MAX_TIMED_PASSES:
+            return None
+        self._labels.append(label)
+        return 2 * len(self._labels) - 2
+
+    def _begin_compute(self, label: str) -> Any:
+        """A new pass."""
+        encoder = self.encoder  # a new one begins a new list of timers
+        return self._passes.begin(encoder, label, self._timer(label))
 
     def compute(self, label: str, module: str, entry: str = "main") -> ComputePass:
         """A compute pass of one dispatch; see the module's docstring."""
@@ -548,13 +586,11 @@ class Gpu(Closing):
             self._record(self._end_chain)
 
     def _begin_chain(self, label: str) -> None:
-        encoder = self.encoder
-        stamps = self.timestamps(label)
-        self._chain = encoder.begin_compute_pass(label=label, **({"timestamp_writes": stamps} if stamps else {}))
+        self._chain = self._begin_compute(label)
 
     def _end_chain(self) -> None:
-        self._chain.end()
-        self._chain = None
+        chain, self._chain = self._chain, None
+        self._passes.end(chain)
 
     @property
     def _kept(self) -> list[Callable[[], object]] | None:
@@ -688,6 +724,15 @@ class Gpu(Closing):
             depth_stencil_format=state.depth,
             depth_read_only=depth_read_only,
         )
+
+    @contextlib.contextmanager
+    def aside(self) -> Iterator[None]:
+        """This thread's passes inside the block are not timed: the timers are those of the thread that draws."""
+        before, self._recording.timed = self._recording.timed, False
+        try:
+            yield
+        finally:
+            self._recording.timed = before
 
     def submit(self) -> None:
         """Send the recorded passes to the device."""
@@ -835,9 +880,16 @@ class Gpu(Closing):
     def forget_groups(self) -> None:
         """Drop cached bind groups, so that destroyed resources are not kept alive by them."""
         self._prepared.clear()
-        for program in self._programs.values():
+        for program in list(self._programs.values()):  # other threads may add to them
             if isinstance(program, _Program):
                 program.groups.clear()
+
+    def forget_programs(self, slot: Slot) -> None:
+        """Drop the pipelines of all shaders that were linked with what this slot declares and tells."""
+        self._prepared.clear()
+        for key in list(self._programs):
+            if slot in key[3]:
+                self._programs.pop(key, None)
 
     # --- life -----------------------------------------------------------------------------------------------------
 
@@ -932,46 +984,43 @@ class Prepared:
     def over(self, width: int, height: int = 1, depth: int = 1) -> None:
         """As :meth:`ComputePass.dispatch`."""
 
-        def dispatch(native: Any, size: tuple[int, int, int]) -> None:
-            native.dispatch_workgroups(-(-width // size[0]), -(-height // size[1]), -(-depth // size[2]))
+        def dispatch(passes: Passes, native: Any, size: tuple[int, int, int]) -> None:
+            passes.dispatch(native, -(-width // size[0]), -(-height // size[1]), -(-depth // size[2]))
 
         self._record(dispatch)
 
     def line(self, count: int) -> None:
         """As :meth:`ComputePass.dispatch_line`."""
 
-        def dispatch(native: Any, size: tuple[int, int, int]) -> None:
+        def dispatch(passes: Passes, native: Any, size: tuple[int, int, int]) -> None:
             groups = max(1, -(-count // size[0]))
-            native.dispatch_workgroups(min(groups, LINE), -(-groups // LINE), 1)
+            passes.dispatch(native, min(groups, LINE), -(-groups // LINE), 1)
 
         self._record(dispatch)
 
     def run(self, x: int, y: int = 1, z: int = 1) -> None:
         """Run that many workgroups: in a pass of its own, or as part of the chain that is open."""
-        self._record(lambda native, _: native.dispatch_workgroups(x, y, z))
+        self._record(lambda passes, native, _: passes.dispatch(native, x, y, z))
 
     def run_indirect(self, arguments: Buffer, offset: int = 0) -> None:
         """As :meth:`run`, of the three numbers of workgroups that stand in a buffer at a byte offset."""
-        self._record(lambda native, _: native.dispatch_workgroups_indirect(arguments.native, offset))
+        self._record(lambda passes, native, _: passes.dispatch_indirect(native, arguments.native, offset))
 
-    def _record(self, dispatch: Callable[[Any, tuple[int, int, int]], None]) -> None:
+    def _record(self, dispatch: Callable[[Passes, Any, tuple[int, int, int]], None]) -> None:
         if self._program is not None and not self._gpu._kept:
             self._encode(dispatch)
         else:
             self._gpu._record(partial(self._encode, dispatch), ready=self._program is not None)
 
-    def _encode(self, dispatch: Callable[[Any, tuple[int, int, int]], None]) -> None:
+    def _encode(self, dispatch: Callable[[Passes, Any, tuple[int, int, int]], None]) -> None:
         gpu, program = self._gpu, self._built()
-        native = gpu._chain
-        if native is None:
-            encoder = gpu.encoder  # a new one begins a new list of timers
-            stamps = gpu.timestamps(self._label)
-            native = encoder.begin_compute_pass(label=self._label, **({"timestamp_writes": stamps} if stamps else {}))
-        native.set_pipeline(program.pipeline)
-        native.set_bind_group(0, self._group)
-        dispatch(native, program.workgroup)
-        if gpu._chain is None:
-            native.end()
+        native = gpu._chain or gpu._begin_compute(self._label)
+        try:
+            gpu._passes.use(native, program.pipeline, self._group)
+            dispatch(gpu._passes, native, program.workgroup)
+        finally:
+            if gpu._chain is None:
+                gpu._passes.end(native)
 
 
 def _threads() -> int:

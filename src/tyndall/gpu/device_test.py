@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import os
+import threading
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import props
 import pytest
+import wgpu
 
 from tyndall.frame import Renderer
 from tyndall.gpu import device
@@ -282,6 +284,24 @@ def test_a_line_of_more_workgroups_than_one_dimension_holds(gpu: Gpu) -> None:
         gpu.forget_groups()
 
 
+def test_a_dispatch_beyond_the_limit_is_an_error_and_the_next_frame_is_well(gpu: Gpu) -> None:
+    values = np.arange(8, dtype=np.uint32)
+    with (
+        gpu.buffer("values", values, owner="test") as source,
+        gpu.buffer("doubled", values, owner="test") as target,
+        props.module(gpu, "double_limit", _DOUBLE) as path,
+    ):
+        scope = {"values": source.split(), "doubled": target.split(write=True), "count": gpu.constant(8)}
+        prepared = gpu.compute("test.double", path).bind(scope).prepare()
+        prepared.run(1 << 20)
+        with pytest.raises(wgpu.GPUError, match="dispatch group size"):
+            gpu.submit()
+        gpu.discard()
+        prepared.run(1)
+        assert (gpu.read_buffer(target)[:8] == 3 * values).all()
+        gpu.forget_groups()
+
+
 _COUNT = """
 import package::bindings::{arguments, window};
 @compute @workgroup_size(4)
@@ -409,3 +429,35 @@ def test_a_device_that_is_closed_waits_for_pipelines() -> None:
     assert len(own.built) <= 12
     with pytest.raises(RuntimeError, match="shutdown"):
         own._builders.submit(int)
+
+
+def test_threads_record_for_themselves_and_share_what_is_cached(gpu: Gpu) -> None:
+    """What one discards, another still submits; what one has compiled, another finds; one of them has the timers."""
+    seen: list[Any] = []
+    quick: dict[str, Any] = {"volumetric": "off", "shadow": ShadowMap(size=16), "antialiasing": "none"}
+
+    def aside() -> None:
+        with gpu.aside(), Renderer(LIT_WALL, (8, 6), gpu=gpu, **quick) as renderer:
+            assert not gpu.recording
+            renderer.draw()
+            seen.append((len(gpu._programs), gpu.timings(), renderer.radiance()))
+
+    with Renderer(LIT_WALL, (8, 6), gpu=gpu, **quick) as renderer, gpu.buffer("b", 16, owner="test") as buffer:
+        gpu.write(buffer, np.full(4, 7, np.uint32))
+        for _ in range(2):  # some passes are of a first frame
+            renderer.draw()
+        timed = [name for name, _ in gpu.timings()]
+        gpu.clear_buffer(buffer)
+        thread = threading.Thread(target=aside)
+        thread.start()
+        thread.join()
+        assert gpu.recording
+        assert (gpu.read_buffer(buffer) == 0).all()
+        renderer.draw()
+        assert [name for name, _ in gpu.timings()] == timed
+        (programs, untimed, radiance) = seen[0]
+        assert programs == len(gpu._programs)
+        assert untimed == []
+        renderer.restart()
+        renderer.draw()
+        np.testing.assert_array_equal(radiance, renderer.radiance())

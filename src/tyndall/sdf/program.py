@@ -81,23 +81,33 @@ _MOST_WIDTHS = 7.02  # of smooth unions, by which a leaf that matters is above t
 class Kinds:
     """The primitives and modifiers of some programs, numbered as their first instructions come.
 
+    Args:
+        like: others, whose numbers it begins with.
+
     Attributes:
         version: grows with every new one: shaders that know fewer must be made anew.
     """
 
-    def __init__(self) -> None:
-        self._primitives: dict[Any, tuple[int, Primitive]] = {}
-        self._modifiers: dict[Any, tuple[int, Modifier]] = {}
-        self.version = 0
+    def __init__(self, like: Kinds | None = None) -> None:
+        self._primitives: dict[Any, tuple[int, Primitive]] = dict(like._primitives) if like else {}
+        self._modifiers: dict[Any, tuple[int, Modifier]] = dict(like._modifiers) if like else {}
+        self._asked: set[Any] = set()
+        self.version: int = like.version if like else 0
 
     def of(self, shape: Primitive | Modifier) -> int:
         """Its number; the same for all whose WESL is the same."""
         known: dict[Any, tuple[int, Any]] = self._primitives if isinstance(shape, Primitive) else self._modifiers
         key = _source(shape)
+        self._asked.add(key)
         if key not in known:
             known[key] = len(known), shape
             self.version += 1
         return known[key][0]
+
+    @property
+    def is_tight(self) -> bool:
+        """Whether it holds none that was never asked for."""
+        return len(self._asked) == len(self._primitives) + len(self._modifiers)
 
     def sources(self) -> list[Any]:
         """The texts among them that a user wrote (:class:`~tyndall.sdf.snippets.SnippetSource`)."""

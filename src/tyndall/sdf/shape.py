@@ -704,13 +704,16 @@ class Transformed(Shape):
 
 
 def transformed_box(box: Box, matrix: Floats) -> Box:
-    """The box of a box under an affine transform; infinite sides stay infinite (Arvo 1990)."""
-    linear = matrix[:3, :3]
+    """The box of a box under an affine transform; infinite sides stay infinite (Arvo 1990).
+
+    (N, 4, 4) transforms of boxes with (N, 1, 3) corners are N boxes.
+    """
+    linear = matrix[..., :3, :3]
     with np.errstate(invalid="ignore"):
         a, b = linear * box[0], linear * box[1]
     a, b = (np.where(linear == 0, 0.0, side) for side in (a, b))  # 0·inf is 0 here
-    low, high = np.minimum(a, b).sum(axis=1), np.maximum(a, b).sum(axis=1)
-    return low + matrix[:3, 3], high + matrix[:3, 3]
+    low, high = np.minimum(a, b).sum(axis=-1), np.maximum(a, b).sum(axis=-1)
+    return low + matrix[..., :3, 3], high + matrix[..., :3, 3]
 
 
 class Marked(Shape):
