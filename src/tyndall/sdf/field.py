@@ -766,12 +766,14 @@ class Field(Closing):
             ParameterError: no such name, a part that is no primitive, or a value that it does not allow.
         """
         sets = self._parts(name)
-        shapes = [self._changed(made, parts, changes) for made, parts in sets]  # all are right, or none is changed
-        for (made, parts), changed in zip(sets, shapes, strict=True):
-            self._edit(made, parts, changes, changed)
+        changed = [self._changed(made, parts, changes) for made, parts in sets]  # all are right, or none is edited
+        for (made, parts), shapes in zip(sets, changed, strict=True):
+            self._edit(made, parts, changes, shapes)
 
-    def _edit(self, made: _Object, parts: _Parts, changes: Mapping[str, Any], changed: Sequence[Any]) -> None:
-        for index, slot, shape in zip(parts.leaves.tolist(), parts.slots.tolist(), changed, strict=True):
+    def _edit(self, made: _Object, parts: _Parts, changes: Mapping[str, Any], shapes: Sequence[Any]) -> None:
+        """Write the numbers of the primitives of a name."""
+        name = parts.name
+        for index, slot, shape in zip(parts.leaves.tolist(), parts.slots.tolist(), shapes, strict=True):
             leaf = made.program.leaves[index]
             made.program.leaves[index] = dataclasses.replace(leaf, shape=shape)
             numbers = np.zeros(8, np.float32)
@@ -806,7 +808,11 @@ class Field(Closing):
                 self._move(made, [(made.parts_of(name), given) for name, given in other.moves.items()])
 
     def _changed(self, made: _Object, parts: _Parts, changes: Mapping[str, Any]) -> list[Any]:
-        """The primitives of a name with other parameters."""
+        """The primitives of a name with other parameters.
+
+        Raises:
+            ParameterError: they are not to be had.
+        """
         name = parts.name
         if (parts.leaves < 0).any():
             raise ParameterError(f"{name}: is more than one primitive, and has no parameters")
