@@ -363,6 +363,16 @@ def test_materials_are_found_in_all_parts() -> None:
     assert [m.name for m in materials_of(Implicit(shape, material=two))] == ["two", "one"]
 
 
+def test_maps_that_are_equally_wide_are_not_one(gpu: Gpu) -> None:
+    fields = Fields(gpu, both([])[0], SIZE)
+    sizes = (16, 16), (16, 8), (8, 16)
+    try:
+        assert [fields._map(size).size[:2] for size in sizes] == list(sizes)
+        assert fields._map((16, 8)) is fields._map((16, 8))
+    finally:
+        fields.close()
+
+
 def test_closing_frees_everything(gpu: Gpu) -> None:
     before = gpu.ledger.total
     fields = Fields(gpu, both([])[0], SIZE)

@@ -34,6 +34,7 @@ class Taa(Technique):
     name: ClassVar[str] = "taa"
     paper: ClassVar[str] = "Karis 2014, High-quality temporal supersampling"
     advice: ClassVar[str] = "The default: smooth edges for the price of one sample a pixel, after a few frames."
+    reads_motion: ClassVar[bool] = True
 
     blend: float = param(0.06, 0.001, 1, "smallest weight of the new frame")
     clip: float = param(1.25, 0.1, 16, "half width of the box that history is clipped to", unit="standard deviation")
