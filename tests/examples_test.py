@@ -23,6 +23,7 @@ LEAVES = {
     "mesh_and_field": ["frame.json", "melted.png"],
     "own_distance": ["urchin.png"],
     "moving_drops": ["drops.webp"],
+    "live_shapes": ["pillow.png"],
 }
 
 

@@ -127,7 +127,9 @@ def test_every_entry_point_compiles_and_is_used(gpu: Gpu, monkeypatch: pytest.Mo
         cast(gpu, world, [[0, 0, 0]], [[0, 0, -1]])
         blocked(gpu, world, [[0, 0, 0]], [[0, 0, -1]])
     evaluate(gpu, Snippet(SnippetSource("plane", "fn plane(p: vec3f) -> f32 { return p.y; }")), np.zeros((1, 3)))
-    with Field(gpu, [Implicit(sphere())]) as field:
+    monkeypatch.setattr("tyndall.sdf.field._MANY", 1)  # so that one leaf's place is sent as those of many are
+    with Field(gpu, [Implicit(sphere().named("ball"))]) as field:
+        field.move("ball", np.zeros((1, 3)))
         values(gpu, field, 0, [[0, 0, 0]])
     for stage in ("fragment", "compute"):
         with Baseline(gpu, Scene(implicits=(Implicit(sphere()),)), (8, 6), stage=stage):  # type: ignore[arg-type]

@@ -11,10 +11,13 @@
 
 from __future__ import annotations
 
+import copy
 import itertools
 import math
 from collections import Counter, defaultdict
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import Any
 
@@ -26,21 +29,25 @@ from tyndall.content.implicit import Fields
 from tyndall.content.mesh import GBUFFER_TARGETS, Meshes
 from tyndall.gpu.device import Gpu, GpuError
 from tyndall.gpu.params import ParameterError, nearest
-from tyndall.gpu.resources import Closing, Resource, Texture
+from tyndall.gpu.resources import Closing, Resource, Slot, Texture
 from tyndall.scene.model import (
     Camera,
     DirectionalLight,
     HenyeyGreenstein,
+    Implicit,
+    Material,
     Medium,
+    Motion,
     RectLight,
     Scene,
     Schlick,
+    Solid,
     SpotLight,
     Volume,
     box_corners,
     transforms,
 )
-from tyndall.sdf.field import Field
+from tyndall.sdf.field import Field, check_snippets
 from tyndall.sdf.marching import Marching
 from tyndall.techniques import FAMILIES, Technique
 from tyndall.techniques.contract import View
@@ -76,6 +83,12 @@ _MOVING = """\
 import package::content::implicit::field_place_before;
 fn place_before(pixel: vec2u, p: vec3f) -> vec3f { return field_place_before(pixel, p); }"""
 _TARGETS = ("normal_roughness", "albedo_metallic", "emissive")
+# Attributes of a renderer that are made for its scene: what a renderer beside it gives it when it takes over.
+_OF_SCENE = (
+    "scene", "_resources", "_images", "_content", "_fields", "_volumes", "_rays", "_targets", "_resolved", "_base",
+    "_shows_surroundings", "_camera", "_scope", "_drawn", "_marched", "_views",
+)  # fmt: skip
+_REMEMBERED = 4  # sets of kinds whose pipelines are kept, so that going back and forth compiles nothing
 
 
 class Renderer(Closing):
@@ -136,12 +149,17 @@ class Renderer(Closing):
         self._own_gpu = gpu is None
         self.gpu = gpu or Gpu(adapter)
         self._views: dict[str, View] = {}
-        self._resources: list[Resource] = []
+        self._resources: dict[Any, Resource] = {}
+        self._beside: Renderer | None = None
+        self._change: _Change | None = None
+        self._asked: Scene | None = None
+        self._gone: set[str] = set()
+        self._known: list[Slot] = []
         self._images: dict[str, Texture] = {}
         self._content: list[Content] = []
         self._fields: Fields | None = None
         self._volumes: list[Filled] = []
-        self._world: World | None = None
+        self._rays: _Rays | None = None
         self._frame = 0
         self._history = 0
         self._casters = True
@@ -161,17 +179,19 @@ class Renderer(Closing):
         gpu, size = self.gpu, self.size
         if max(size) > (limit := gpu.limits["max-texture-dimension-2d"]):
             raise GpuError(f"size: {size[0]}×{size[1]} is beyond this adapter's limit of {limit} pixels a side")
-        black = gpu.texture("frame.black", (1, 1), "rgba32float", owner=OWNER, usage="sampled")
-        self._resources.append(black)
+        black = self._image("black", (1, 1), "rgba32float", "sampled")
         gpu.write_texture(black, np.zeros((1, 1, 4), np.float32))
-        self._meshes = Meshes(gpu, self.scene)
+        if self._beside is None:
+            self._meshes = Meshes(gpu, self.scene)
         self._content = [self._meshes]
         if self.scene.implicits:
             marching = self._marching or Marching.of(self.scene.looks)
-            self._fields = Fields(gpu, self.scene, size, marching)
+            before = self._beside._fields if self._beside else None
+            self._fields = Fields(gpu, self.scene, size, marching, like=before.field if before else None)
             self._content.append(self._fields)
-        for volume in self.scene.volumes:
-            self._volumes.append(self._fill(volume))
+        self._rays = _Rays(self, self._beside._tree.made if self._beside else None)
+        for number, volume in enumerate(self.scene.volumes):
+            self._volumes.append(self._fill(volume, number))
         self._targets = _TARGETS if any(content.emits for content in self._content) else _TARGETS[:2]
         for name, format in _IMAGES.items():
             if name in _TARGETS and name not in self._targets:
@@ -180,15 +200,16 @@ class Renderer(Closing):
             drawn = name in _TARGETS or name in ("depth", "inscatter")
             stored = name != "depth" and (name not in _TARGETS or self._fields is not None)
             usage = " ".join(["sampled", *(["target"] if drawn else []), *(["storage"] if stored else [])])
-            image = gpu.texture(f"frame.{name}", size, format or gpu.depth_format, owner=OWNER, usage=usage)
-            self._images[name] = image
-            self._resources.append(image)
+            self._images[name] = self._image(name, size, format or gpu.depth_format, usage)
         self._resolved, self._base = self._images["lit"], self._images["base"]
         self._shows_surroundings = shows_surroundings(self.scene)
-        self._camera = self._buffer("camera", gpu.dtype(_CAMERA).itemsize, _CAMERA, "uniform")
+        self._camera = self._buffer("camera", gpu.dtype(_CAMERA).itemsize, _CAMERA, "uniform", own=True)
         self._medium = self._buffer("medium", gpu.dtype(_MEDIUM).itemsize, _MEDIUM, "uniform")
         count = max(1, len(self.scene.lights))
         self._lights = self._buffer("lights", count * gpu.dtype(_LIGHT).itemsize, _LIGHT, "storage")
+        if self._beside is None:
+            gpu.write(self._medium, pack_medium(self.scene.medium, gpu.dtype(_MEDIUM)))
+            gpu.write(self._lights, pack_lights(self.scene, gpu.dtype(_LIGHT)))
         self._scope: dict[str, Any] = {
             "camera": self._camera.uniform().telling(_MOVING if self._fields else _STILL),
             "medium": self._medium.uniform(),
@@ -204,25 +225,38 @@ class Renderer(Closing):
             self._marched = {"depth": self._fields.depth.sampled().telling(_DEPTH_OF.replace("0);", "0).x;"))}
             self._scope |= self._fields.bindings
             self._scope |= {f"{name}_out": self._images[name].write() for name in self._targets}
-        gpu.write(self._medium, pack_medium(self.scene.medium, gpu.dtype(_MEDIUM)))
-        gpu.write(self._lights, pack_lights(self.scene, gpu.dtype(_LIGHT)))
         for family, technique in techniques.items():
             self.use(family, technique)
 
-    def _fill(self, volume: Volume) -> Filled:
+    def _fill(self, volume: Volume, number: int) -> Filled:
         gpu = self.gpu
         medium, edge = (
-            self._buffer(f"volume.{label}", size, element, "uniform")
+            self._buffer(f"volume.{number}.{label}", size, element, "uniform")
             for label, size, element in (("medium", gpu.dtype(_MEDIUM).itemsize, _MEDIUM), ("edge", 16, "f32"))
         )
         gpu.write(medium, pack_medium(volume.medium, gpu.dtype(_MEDIUM)))
         gpu.write(edge, np.array([volume.edge, 0, 0, 0], np.float32))
         return Filled(volume, Field(gpu, [volume.surface], owner="volume"), medium.uniform(), edge.uniform())
 
-    def _buffer(self, label: str, size: int, element: str, usage: str) -> Any:
-        buffer = self.gpu.buffer(f"frame.{label}", size, owner=OWNER, element=element, usage=usage)
-        self._resources.append(buffer)
-        return buffer
+    def _image(self, name: str, size: tuple[int, int], format: str, usage: str) -> Texture:
+        made = self._held(
+            (name, size, format, usage),
+            lambda: self.gpu.texture(f"frame.{name}", size, format, owner=OWNER, usage=usage),
+        )
+        assert isinstance(made, Texture)
+        return made
+
+    def _buffer(self, label: str, size: int, element: str, usage: str, *, own: bool = False) -> Any:
+        return self._held(
+            (label, size, element, usage, object() if own else None),
+            lambda: self.gpu.buffer(f"frame.{label}", size, owner=OWNER, element=element, usage=usage),
+        )
+
+    def _held(self, key: Any, make: Callable[[], Resource]) -> Resource:
+        """What the renderer beside this one has of this description, or a new one."""
+        shared = self._beside._resources.get(key) if self._beside else None
+        self._resources[key] = shared or make()
+        return self._resources[key]
 
     def use(self, family: str, technique: str | Technique) -> Technique:
         """Switch to another technique of a family; the old one's memory is freed, and temporal history begins anew:
@@ -250,12 +284,11 @@ class Renderer(Closing):
             owner,
             made,
             self._images,
-            make_world=lambda: self.world,
+            make_world=self._tree.get,
             fields=self._fields.field if self._fields else None,
         )
-        if self._world and not self._casts_rays():
-            self._world.close()
-            self._world = None
+        if not self._casts_rays():
+            self._tree.close()
         return made
 
     def _casts_rays(self) -> bool:
@@ -264,14 +297,12 @@ class Renderer(Closing):
     @property
     def world(self) -> World:
         """The scene for rays; built when it is asked for first, freed by :meth:`use` once no technique casts any."""
-        if self._world is None:
-            self._world = World(
-                self.gpu,
-                self.scene,
-                meshes=self._meshes,
-                fields=self._fields.field if self._fields else None,
-            )
-        return self._world
+        return self._tree.get()
+
+    @property
+    def _tree(self) -> _Rays:
+        assert self._rays is not None, "the renderer is closed"
+        return self._rays
 
     def technique(self, family: str) -> Any:
         """The technique in use."""
@@ -294,26 +325,37 @@ class Renderer(Closing):
             time: seconds at which the scene's ``motion`` is asked where things are; None leaves them.
             jitter: False draws through the pixels' centres whatever the antialiasing technique.
             casters: False leaves shadow maps empty, so that light reaches everything.
+
+        Raises:
+            ParameterError: ``motion`` moves what is not there.
+            Exception: what a change that was asked for (:meth:`replace`) failed with, once; what is drawn stays.
         """
         begin = perf_counter()
+        if self._change is not None and self._change.ready.done():
+            self._follow()
         if time is not None and time != self._time and self.scene.motion:
-            for name, moves in self.scene.motion(time).items():
-                self.move(name, moves)
+            moves = self.scene.motion(time)
+            self._move({name: moves[name] for name in moves if name not in self._gone} if self._gone else moves)
             self._time = time
         try:
-            self._record(camera or self.scene.camera, jitter, casters)
+            with self.gpu.together():
+                self._record(camera or self.scene.camera, jitter, casters)
         except BaseException:
-            self.gpu.discard()  # half a frame must not precede the next one
-            for view in self._views.values():
-                view.forget()
-            for field in [*([self._fields.field] if self._fields else []), *(filled.field for filled in self._volumes)]:
-                field.forget()
+            self._discard()  # half a frame must not precede the next one
             raise
         self.gpu.submit()
         self._frame += 1
         self._history += 1
         self._moved = False
         return (perf_counter() - begin) * 1e3
+
+    def _discard(self) -> None:
+        """What was recorded did not happen."""
+        self.gpu.discard()
+        for view in self._views.values():
+            view.forget()
+        for field in [*([self._fields.field] if self._fields else []), *(filled.field for filled in self._volumes)]:
+            field.forget()
 
     def _record(self, camera: Camera, jitter: bool, casters: bool) -> None:
         gpu, images = self.gpu, self._images
@@ -419,21 +461,14 @@ class Renderer(Closing):
         Raises:
             ParameterError: there is none such, or a transform that has no inverse.
         """
-        if isinstance(which, str):
-            found = self._objects(which) or [self._unknown(which)]
-            if len(found) > 1:
-                raise ParameterError(f"which: {len(found)} implicit surfaces are called '{which}'; give a number")
-            which = found[0]
-        if self._fields is None or which not in range(len(self.scene.implicits)):
-            raise ParameterError(f"which: the scene has {len(self.scene.implicits)} implicit surfaces, and no {which}")
+        which = self._number(which, self.scene.implicits)
+        assert self._fields is not None
         matrix = transforms("transform", transform)[0]
         if np.shape(transform) != (4, 4):
             raise ParameterError(f"transform: shape {np.shape(transform)} is not (4, 4)")
-        placed = replace(self.scene.implicits[which], transform=matrix)
         self._fields.place(which, matrix)
         self._moved = True
-        if placed.bounds is not None:
-            self._hold(*placed.bounds)
+        self._reach(which)
 
     def move(self, name: str, moves: ArrayLike) -> None:
         """From the next frame on, objects or parts of a name are moved from where they stand at rest; as in
@@ -446,21 +481,29 @@ class Renderer(Closing):
         Raises:
             ParameterError: no such name, or what are no transforms.
         """
-        objects = self._objects(name)
-        given = moves if isinstance(moves, np.ndarray) else np.empty(0)
-        if objects or given.shape[1:] != (3,):  # ways of parts are written as they are
-            given = transforms(name, moves)
-        if len(given) < len(objects):
-            raise ParameterError(f"{name}: {len(given)} transforms for {len(objects)} objects")
-        for index, matrix in zip(objects, given, strict=False):
-            self.place(index, matrix @ np.asarray(self.scene.implicits[index].transform))
-        if self._fields and name in self._fields.parts:
-            self._fields.field.move(name, given[len(objects) :])
+        self._move({name: moves})
+
+    def _move(self, moves: Mapping[str, ArrayLike]) -> None:
+        """As :meth:`move`, of several names: their parts move together, which costs less than one after another."""
+        parts: dict[str, ArrayLike] = {}
+        for name, value in moves.items():
+            objects = self._objects(name)
+            given = value if isinstance(value, np.ndarray) else np.empty(0)
+            if objects or given.shape[1:] != (3,):  # ways of parts are written as they are
+                given = transforms(name, value)
+            if len(given) < len(objects):
+                raise ParameterError(f"{name}: {len(given)} transforms for {len(objects)} objects")
+            for index, matrix in zip(objects, given, strict=False):
+                self.place(index, matrix @ np.asarray(self.scene.implicits[index].transform))
+            if self._fields and name in self._fields.parts:
+                parts[name] = given[len(objects) :]
+            elif not objects:
+                self._unknown(name)
+            elif len(given) > len(objects):
+                raise ParameterError(f"{name}: {len(given)} transforms for {len(objects)} objects")
+        if self._fields and parts:
+            self._fields.field.move_all(parts)
             self._moved = True
-        elif not objects:
-            self._unknown(name)
-        elif len(given) > len(objects):
-            raise ParameterError(f"{name}: {len(given)} transforms for {len(objects)} objects")
 
     def edit(self, name: str, **changes: Any) -> None:
         """From the next frame on, the primitives of a name have other parameters: ``edit("ball", radius=0.3)``. Some
@@ -478,14 +521,224 @@ class Renderer(Closing):
     def _objects(self, name: str) -> list[int]:
         return [i for i, one in enumerate(self.scene.implicits) if name and one.name == name]
 
-    def _unknown(self, name: str) -> int:
-        known = {one.name for one in self.scene.implicits if one.name} | (self._fields.parts if self._fields else set())
-        raise ParameterError(f"no object or part '{name}'{nearest(name, sorted(known))}")
+    def _number(self, which: int | str, implicits: Sequence[Implicit]) -> int:
+        """The number of one of several implicit surfaces."""
+        if isinstance(which, str):
+            found = [i for i, one in enumerate(implicits) if one.name == which]
+            if not which or not found:
+                known = sorted({one.name for one in implicits if one.name})
+                raise ParameterError(f"no object '{which}'{nearest(which, known)}")
+            if len(found) > 1:
+                raise ParameterError(f"which: {len(found)} implicit surfaces are called '{which}'; give a number")
+            return found[0]
+        if which not in range(len(implicits)):
+            raise ParameterError(f"which: the scene has {len(implicits)} implicit surfaces, and no {which}")
+        return which
+
+    def _unknown(self, name: str) -> None:
+        raise ParameterError(f"no object or part '{name}'{nearest(name, sorted(self._names))}")
+
+    @property
+    def _names(self) -> set[str]:
+        """Of objects and parts."""
+        return {one.name for one in self.scene.implicits if one.name} | (self._fields.parts if self._fields else set())
+
+    # --- another set of shapes ------------------------------------------------------------------------------------
+
+    def reshape(self, which: int | str, shape: Solid | None = None, *, material: Material | None = None) -> None:
+        """An implicit surface gets another shape, or another material, or both; see :meth:`replace`. It stays where it
+        was placed; the parts of another shape are at rest.
+
+        Args:
+            which: its number in what was asked for last (at first ``scene.implicits``), or its name.
+
+        Raises:
+            ParameterError: there is none such, a flat shape, or neither shape nor material.
+            SnippetError: a user's code that does not compile.
+            Unsupported: a technique in use cannot draw it.
+        """
+        if shape is None and material is None:
+            raise ParameterError("reshape: neither a shape nor a material")
+        asked = list(self._wanted.implicits)
+        number = self._number(which, asked)
+        before = asked[number]
+        asked[number] = replace(before, shape=shape or before.shape, material=material or before.material)
+        self.replace(asked)
+
+    def add(self, implicit: Implicit) -> None:
+        """One more implicit surface, after the others; see :meth:`replace`, and :meth:`reshape` for what it raises."""
+        self.replace([*self._wanted.implicits, implicit])
+
+    def remove(self, which: int | str) -> None:
+        """One implicit surface fewer; see :meth:`replace`. The scene's ``motion`` may go on moving it.
+
+        Args:
+            which: as of :meth:`reshape`.
+
+        Raises:
+            ParameterError: there is none such.
+        """
+        asked = list(self._wanted.implicits)
+        del asked[self._number(which, asked)]
+        self.replace(asked)
+
+    def replace(
+        self,
+        implicits: Iterable[Implicit],
+        *,
+        motion: Motion | None = None,
+        room: tuple[tuple[float, float, float], tuple[float, float, float]] | None = None,
+    ) -> None:
+        """The scene is to have these implicit surfaces, as soon as it can.
+
+        Another set of kinds of shapes, of snippets above all, is other shaders. So what the new ones need is prepared
+        beside what is drawn, by a thread of its own, pipelines included; :meth:`draw` goes on drawing the old ones,
+        and takes the new ones with the first frame for which they are ready. What stays is not moved: objects that are
+        among both are where :meth:`place`, :meth:`move` and :meth:`edit` have left them by then. Where the set of kinds
+        and the number of objects are the same, and no expression nests deeper, nothing is compiled. Of what is asked
+        for meanwhile the last is prepared next. Until then the device holds the techniques' own images twice.
+
+        What is wrong with a shape is told here. What only the preparation finds, such as too little memory, the next
+        :meth:`draw` or :meth:`settle` raises, and what is drawn stays.
+
+        Args:
+            motion: in place of the scene's.
+            room: likewise.
+
+        Raises:
+            ParameterError: what are no implicit surfaces.
+            SnippetError: a user's code that does not compile.
+            Unsupported: a technique in use cannot draw them.
+        """
+        wanted = self._wanted
+        asked = wanted.with_(implicits=implicits, motion=motion or wanted.motion, room=room or wanted.room)
+        drawn = {id(one) for one in wanted.implicits}
+        for one in asked.implicits:
+            if id(one) not in drawn:
+                check_snippets(self.gpu, one)
+        for view in self._views.values():
+            view.technique.supports(asked)
+        self._asked = asked
+        if self._change is None:
+            self._prepare()
+
+    @property
+    def pending(self) -> bool:
+        """Whether something was asked for (:meth:`replace`) that is not drawn yet."""
+        return self._change is not None
+
+    def settle(self) -> None:
+        """Wait until all that was asked for is ready, and take it; the next frame shows it.
+
+        Raises:
+            Exception: as :meth:`draw`.
+        """
+        while self._change is not None:
+            self._follow()
+
+    @property
+    def _wanted(self) -> Scene:
+        return self._asked or self.scene
+
+    def _prepare(self) -> None:
+        assert self._asked is not None
+        techniques = {family: view.technique for family, view in self._views.items()}
+        camera = self._camera_seen or self.scene.camera
+        thread = ThreadPoolExecutor(1, "tyndall.prepare")
+        ready = thread.submit(copy.copy(self)._ready, self, self._asked, techniques, camera)
+        thread.shutdown(wait=False)
+        self._change = _Change(self._asked, techniques, ready)
+
+    def _ready(self, beside: Renderer, scene: Scene, techniques: dict[str, Technique], camera: Camera) -> Renderer:
+        """Make this copy of a renderer one of another scene, which shares with it what does not depend on implicit
+        surfaces, and has all pipelines that its frames need.
+        """
+        self._beside, self._own_gpu, self._change, self.scene = beside, False, None, scene
+        self._views, self._resources, self._images, self._content, self._volumes = {}, {}, {}, [], []
+        self._fields = self._rays = None
+        with self.gpu.aside():
+            try:
+                self._setup(techniques)
+                for frame in range(2):  # the first has no past, so it may have other shaders
+                    self._frame, self._history = frame, frame
+                    self._record(camera, jitter=True, casters=True)
+                    self._discard()
+            except BaseException:
+                self.close()
+                raise
+        return self
+
+    def _follow(self) -> None:
+        """Wait for what is being prepared, take it, and begin to prepare what was asked for since."""
+        change = self._change
+        assert change is not None
+        failure = change.ready.exception()
+        self._change = None
+        if failure is None:
+            try:
+                self._take_over(change.ready.result())
+            except Exception as error:
+                failure = error
+        elif any(self.technique(family) is not one for family, one in change.techniques.items()):
+            failure = None  # what it shared may have been freed with the technique
+            change = None
+        if change is not None and self._asked is change.scene:
+            self._asked = None
+        if self._asked is not None:
+            self._prepare()
+        if failure is not None:
+            raise failure
+
+    def _take_over(self, ready: Renderer) -> None:
+        """Draw from now on what another renderer has prepared; what this one has made for its scene is freed."""
+        names, techniques = self._names, {family: view.technique for family, view in self._views.items()}
+        kept = dict(_kept(self.scene.implicits, ready.scene.implicits))
+        try:
+            for technique in techniques.values():
+                technique.supports(ready.scene)  # others may be in use by now
+            if ready._fields and self._fields:
+                ready._fields.carry(self._fields, kept)
+        except BaseException:
+            ready.close()
+            raise
+        self.gpu.submit()
+        old = copy.copy(self)
+        for name in _OF_SCENE:
+            setattr(self, name, getattr(ready, name))
+        self._tree.take(old._tree)
+        old._beside, old._own_gpu = self, False
+        old.close()
+        self._meshes.forget_bundles()
+        for family, technique in techniques.items():
+            if self.technique(family) is not technique:
+                self.use(family, technique)
+        self._gone = (self._gone | names) - self._names
+        for index in kept:
+            self._reach(index)
+        self._time = self._camera_seen = None
+        self._history = self._sent = 0
+        self._remember()
+
+    def _remember(self) -> None:
+        """Let go of the pipelines of sets of kinds that were drawn long ago."""
+        if self._fields is None:
+            return
+        slot = self._fields.field.bindings["implicit_objects"].slot
+        self._known = [*(one for one in self._known if one != slot), slot]
+        for one in self._known[:-_REMEMBERED]:
+            self.gpu.forget_programs(one)
+        self._known = self._known[-_REMEMBERED:]
 
     @property
     def uploaded(self) -> int:
         """Bytes that the last frame's implicit surfaces were sent to the device anew: 0 where nothing has moved."""
         return self._uploaded
+
+    def _reach(self, index: int) -> None:
+        """Let the scene's box hold an object where it has been placed."""
+        assert self._fields is not None
+        if (bounds := self.scene.implicits[index].bounds_at(self._fields.placed(index))) is not None:
+            self._hold(*bounds)
 
     def _hold(self, low: NDArray[np.float64], high: NDArray[np.float64]) -> None:
         """Let the scene's box hold another one: by more than it needs, so that maps are seldom fitted anew."""
@@ -610,34 +863,105 @@ class Renderer(Closing):
         """
         totals: Counter[str] = Counter()
         held = [content.resources() for content in self._content] + [view.resources() for view in self._views.values()]
-        if self._world:
-            held.append(self._world.resources())
+        if self._rays and self._rays.made:
+            held.append(self._rays.made.resources())
         held += [filled.field.resources() for filled in self._volumes]
-        for resource in itertools.chain(self._resources, *held):
+        for resource in itertools.chain(self._resources.values(), *held):
             totals[resource.owner] += resource.size_bytes
         return dict(totals)
 
     def close(self) -> None:
-        """Free everything this renderer made."""
+        """Free everything this renderer made, once what is being prepared is."""
+        if self._change is not None:
+            ready, self._change = self._change.ready, None
+            if ready.exception() is None:
+                ready.result().close()
         self.gpu.discard()
         for view in self._views.values():
             view.close()
-        if self._world:
-            self._world.close()
-            self._world = None
+        if self._rays:
+            self._rays.close()
+        beside = self._beside
         for content in self._content:
-            content.close()
+            if beside is None or content is not beside._meshes:
+                content.close()
         for filled in self._volumes:
             filled.field.close()
-        for resource in self._resources:
-            resource.destroy()
+        for key, resource in self._resources.items():
+            if beside is None or beside._resources.get(key) is not resource:
+                resource.destroy()
         self._views.clear()
         self._content.clear()
         self._volumes.clear()
         self._resources.clear()
+        self._rays = None
         self.gpu.forget_groups()
         if self._own_gpu:
             self.gpu.close()
+
+
+class _Rays:
+    """The scene for rays, built when it is asked for first.
+
+    Args:
+        beside: what a renderer beside this one has built of the same triangles.
+
+    Attributes:
+        made: it, once it is built.
+    """
+
+    def __init__(self, renderer: Renderer, beside: World | None) -> None:
+        self._gpu, self._scene, self._meshes = renderer.gpu, renderer.scene, renderer._meshes
+        self._fields = renderer._fields.field if renderer._fields else None
+        self._beside = beside
+        self.made: World | None = None
+
+    def get(self) -> World:
+        if self.made is None:
+            self.made = (
+                self._beside.beside(self._fields)
+                if self._beside
+                else World(self._gpu, self._scene, meshes=self._meshes, fields=self._fields)
+            )
+        return self.made
+
+    def take(self, old: _Rays) -> None:
+        """The tree of the renderer beside, which gives way to this one."""
+        if self.made is not None and (old.made is not None or self._beside is not None):
+            self.close()
+        if old.made is not None:
+            self.made, old.made = old.made, None
+            self.made.see(self._fields)
+        self._beside = None
+
+    def close(self) -> None:
+        if self.made is not None:
+            self.made.close()
+            self.made = None
+
+
+@dataclass(frozen=True, eq=False)
+class _Change:
+    """What is being prepared: of which scene, for which techniques, and the renderer that will be ready."""
+
+    scene: Scene
+    techniques: dict[str, Technique]
+    ready: Future[Renderer]
+
+
+def _kept(old: Sequence[Implicit], new: Sequence[Implicit]) -> Iterator[tuple[int, int]]:
+    """Numbers, among the new and among the old, of objects that are the same, or are called the same."""
+    numbers = {id(one): number for number, one in enumerate(old)}
+    names = [Counter(one.name for one in some if one.name) for some in (old, new)]
+    called = {one.name: number for number, one in enumerate(old) if names[0][one.name] == 1}
+    for number, one in enumerate(new):
+        before = numbers.get(id(one))
+        if before is None and names[1][one.name] == 1:
+            before = called.get(one.name)
+            if before is not None and old[before].transform != one.transform:
+                before = None
+        if before is not None:
+            yield number, before
 
 
 # --- packing ------------------------------------------------------------------------------------------------------
@@ -684,6 +1008,8 @@ def pack_camera(camera: Camera, scene: Scene, size: tuple[int, int], dtype: np.d
 def shifted(row: Any, shift: tuple[float, float]) -> Any:
     """A copy of a camera's uniform whose samples lie that many pixels (right, down) of the pixels' centres."""
     moved = row.copy()
+    if not any(shift):
+        return moved
     width, height = row["size"]
     ndc = (-2 * shift[0] / width, 2 * shift[1] / height)  # the picture moves against the samples
     moved["jitter"] = ndc

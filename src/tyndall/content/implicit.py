@@ -45,13 +45,24 @@ _ID_BITS = 20  # as in implicit.wesl
 class Fields:
     """The implicit surfaces of a scene on the device, and the images that they are marched into.
 
+    Args:
+        like: as of :class:`~tyndall.sdf.field.Field`.
+
     Attributes:
         field: the objects.
         emits: whether a material does, so that the G-buffer has a target for it.
         parts: names of parts of the shapes.
     """
 
-    def __init__(self, gpu: Gpu, scene: Scene, size: tuple[int, int], marching: Marching | None = None) -> None:
+    def __init__(
+        self,
+        gpu: Gpu,
+        scene: Scene,
+        size: tuple[int, int],
+        marching: Marching | None = None,
+        *,
+        like: Field | None = None,
+    ) -> None:
         self._gpu, self._size, self._lights = gpu, size, len(scene.lights)
         self._placed = [np.asarray(one.transform) for one in scene.implicits]
         self._moves = self._parts_move = False
@@ -66,7 +77,7 @@ class Fields:
         self.parts = {
             node.name for one in scene.implicits for node in paint.nodes_of(one.shape) if isinstance(node, Named)
         }
-        self.field = Field(gpu, scene.implicits, marching=marching)
+        self.field = Field(gpu, scene.implicits, marching=marching, like=like)
         try:
             for name, format in (("depth", "r32float"), ("ids", "r32uint")):
                 self._images[name] = gpu.texture(f"field.{name}", size, format, owner=OWNER)
@@ -98,9 +109,19 @@ class Fields:
 
     def place(self, index: int, transform: NDArray[np.float64]) -> None:
         """An object stands elsewhere from the next frame on."""
-        self._before.setdefault(index, self._placed[index])
-        self._placed[index] = transform
         self.field.place(index, transform)
+        self._before.setdefault(index, self._placed[index])
+        self._placed[index] = np.array(transform)
+
+    def placed(self, index: int) -> NDArray[np.float64]:
+        """4×4: where an object stands."""
+        return self._placed[index]
+
+    def carry(self, old: Fields, kept: Mapping[int, int]) -> None:
+        """As :meth:`tyndall.sdf.field.Field.carry`; no object is taken to be moving."""
+        for index, before in kept.items():
+            self._placed[index] = old._placed[before]
+        self.field.carry(old.field, kept)
 
     def update(self, *, follows: bool) -> None:
         """Bring the device up to date, at the beginning of a frame.

@@ -95,6 +95,23 @@ def test_depth_and_normals_are_a_spheres(gpu: Gpu) -> None:
     assert np.median(np.sum(normals * expected, -1)[inside]) > 0.9995
 
 
+def test_from_afar_normals_are_a_spheres(gpu: Gpu) -> None:
+    """Where pixels are wider than the cells of a program, and meet the surface where cells have none."""
+    shells = union(*(sphere(r) for r in np.linspace(0.2, RADIUS, 12)))
+    far = Camera((0, 0, 40), (0, 0, 0), fov=0.1)
+    with Renderer(Scene(camera=far, implicits=[Implicit(shells)]), SIZE, gpu=gpu, **QUIET) as renderer:
+        renderer.draw()
+        seen = np.isfinite(renderer.depth())
+        normals = gpu.read_texture(renderer._images["normal_roughness"])[..., :3].astype(float)
+    y, x = np.indices(seen.shape)
+    places = np.stack([x + 0.5 - SIZE[0] / 2, SIZE[1] / 2 - y - 0.5], -1) * 2 * 40 * math.tan(far.fov / 2) / SIZE[1]
+    inside = np.hypot(*np.moveaxis(places, -1, 0)) < 0.8 * RADIUS
+    assert 100 < inside.sum() < 400
+    assert seen[inside].all()
+    expected = np.concatenate([places, np.sqrt(np.maximum(RADIUS**2 - (places**2).sum(-1, keepdims=True), 0))], -1)
+    assert np.sum(normals * expected / RADIUS, -1)[inside].min() > 0.99
+
+
 def test_the_nearer_of_mesh_and_surface_is_seen(gpu: Gpu) -> None:
     """A wall through the sphere's middle hides its back half, and is hidden by its front half."""
     red, green = (Material(base_color=(*color, 1), roughness=1) for color in ((1, 0, 0), (0, 1, 0)))

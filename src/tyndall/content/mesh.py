@@ -9,6 +9,7 @@ recorded once into render bundles and replayed, so a frame's host cost does not 
 from __future__ import annotations
 
 import math
+import threading
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal
@@ -127,6 +128,7 @@ class Meshes:
         self._outline: Outline | None = None
         self._outlined = False
         self._triangles: Triangles | None = None
+        self._lock = threading.RLock()  # renderers beside each other share what is made on first use
         try:
             self._upload(scene)
         except BaseException:
@@ -270,20 +272,22 @@ class Meshes:
 
     def outline(self) -> Outline | None:
         """The adjacency of all solid triangles, made on first use and then kept; None where there are none."""
-        if not self._outlined:
-            self._outlined = True
-            solid = [p for draw in self._draws if not draw.is_masked for p in draw.placements()]
-            streams = (self.positions, self.indices, self._instances.read())
-            self._outline = Outline(self._gpu, solid, streams, owner=OWNER) if solid else None
-        return self._outline
+        with self._lock:
+            if not self._outlined:
+                self._outlined = True
+                solid = [p for draw in self._draws if not draw.is_masked for p in draw.placements()]
+                streams = (self.positions, self.indices, self._instances.read())
+                self._outline = Outline(self._gpu, solid, streams, owner=OWNER) if solid else None
+            return self._outline
 
     def triangles(self) -> Triangles | None:
         """All solid triangles, for passes in compute, made on first use and then kept; None where there are none."""
         solid = [p for draw in self._draws if not draw.is_masked for p in draw.placements()]
-        if self._triangles is None and solid:
-            streams = (self.positions, self.indices, self._instances.read())
-            self._triangles = Triangles(self._gpu, solid, streams, owner=OWNER)
-        return self._triangles
+        with self._lock:
+            if self._triangles is None and solid:
+                streams = (self.positions, self.indices, self._instances.read())
+                self._triangles = Triangles(self._gpu, solid, streams, owner=OWNER)
+            return self._triangles
 
     def _replay(self, native_pass: Any, way: _Way, scope: Mapping[str, Bound], casters: Casters = "all") -> None:
         draws = [draw for draw in self._draws if casters == "all" or draw.is_masked]
@@ -291,9 +295,10 @@ class Meshes:
             return
         bound = {name: scope[name] for name in _BOUND[way.kind]}
         key = (way, casters, tuple(b.key for b in bound.values()))
-        if key not in self._bundles:
-            self._bundles[key] = self._record(way, bound, draws)
-        native_pass.execute_bundles([self._bundles[key]])
+        bundle = self._bundles.get(key)
+        if bundle is None:
+            bundle = self._bundles[key] = self._record(way, bound, draws)
+        native_pass.execute_bundles([bundle])
 
     def _record(self, way: _Way, scope: Mapping[str, Any], draws: list[_Draw]) -> Any:
         gpu = self._gpu

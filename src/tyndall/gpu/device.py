@@ -8,7 +8,11 @@ A pass is one expression whose name is its label, its timer and its line in ever
 
 ``bind`` names what the shader may import from ``package::bindings``; the layout holds what it does import. Pipelines,
 bind groups and layouts are cached, so that the same expression costs little in the next frame. Passes are recorded
-into one encoder until :meth:`Gpu.submit`.
+into one encoder until :meth:`Gpu.submit`. Inside ``with gpu.together():`` the pipelines that are not there yet are
+built side by side, each in a thread, while what is to be recorded waits in order.
+
+A device may be used from several threads. Each records, submits and discards passes of its own, and all share what is
+cached: so what one thread prepares (:meth:`Gpu.aside`) another one finds made.
 """
 
 from __future__ import annotations
@@ -18,15 +22,21 @@ import logging
 import os
 import sys
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
+from time import perf_counter
 from typing import Any, Self
 
 import numpy as np
 import wgpu
 from numpy.typing import NDArray
 
+from tyndall.gpu import driver_types
 from tyndall.gpu import params as declared
+from tyndall.gpu.passes import Passes
 from tyndall.gpu.resources import (
     BYTES_PER_TEXEL,
     Bound,
@@ -41,7 +51,7 @@ from tyndall.gpu.resources import (
     Texture,
     texel_dtype,
 )
-from tyndall.gpu.shader import Linked, Linker, create_module, diagnose
+from tyndall.gpu.shader import Linker, create_module, diagnose
 
 log = logging.getLogger("tyndall")
 
@@ -65,6 +75,7 @@ _LIMITS = (
 _RANK_TYPE = {"DiscreteGPU": 0, "IntegratedGPU": 1, "VirtualGPU": 2, "Unknown": 3, "CPU": 4}
 _BACKENDS = ("Vulkan", "Metal", "D3D12")
 _MAX_TIMED_PASSES = 2048
+_MOST_PREPARED = 1024
 _UPLOAD_CHUNK = 64 << 20
 LINE = 32_768  # workgroups in a row of a one-dimensional dispatch
 
@@ -83,6 +94,7 @@ def adapters() -> list[wgpu.GPUAdapter]:
     if lacking:
         os.environ["XDG_RUNTIME_DIR"] = tempfile.gettempdir()
     try:
+        driver_types.look_up()
         found = [a for a in wgpu.gpu.enumerate_adapters_sync() if a.info["backend_type"] in _BACKENDS]
     finally:
         if lacking:
@@ -188,12 +200,91 @@ class Raster:
     vertex_buffers: tuple[tuple[int, tuple[tuple[int, str, int], ...]], ...] = ()
 
 
+# All that a pipeline is built from: module, entry points, names and slots of what is bound, overlay, features, state.
+_ProgramKey = tuple[
+    str,
+    tuple[str, ...],
+    tuple[str, ...],
+    tuple[Slot, ...],
+    tuple[tuple[str, str], ...],
+    tuple[tuple[str, bool], ...],
+    Raster | None,
+]
+
+
+def _program_key(
+    module: str,
+    entries: tuple[str, ...],
+    bound: Mapping[str, Bound],
+    overlay: Mapping[str, str],
+    features: Mapping[str, bool],
+    state: Raster | None,
+) -> _ProgramKey:
+    slots = tuple(b.slot for b in bound.values())
+    return module, entries, tuple(bound), slots, tuple(overlay.items()), tuple(features.items()), state
+
+
 @dataclass
 class _Program:
     pipeline: Any
     group_layout: Any
     used: tuple[tuple[int, str], ...]
     groups: dict[tuple[int, ...], Any]
+    workgroup: tuple[int, int, int]  # of a compute pipeline
+
+
+class _Waiting(threading.local):
+    """What a thread has not recorded yet, in order; None outside of :meth:`Gpu.together`."""
+
+    kept: list[Callable[[], object]] | None = None
+
+
+class _Calls:
+    """Stands for a native pass that has not begun yet: keeps what is called of it, none of which answers anything."""
+
+    def __init__(self) -> None:
+        self._made: list[tuple[str, tuple[Any, ...], dict[str, Any]]] = []
+
+    def __getattr__(self, name: str) -> Callable[..., None]:
+        return lambda *args, **named: self._made.append((name, args, named))
+
+    def repeat(self, native: Any) -> None:
+        for name, args, named in self._made:
+            getattr(native, name)(*args, **named)
+
+
+@dataclass(frozen=True)
+class Built:
+    """A pipeline that was built, and the milliseconds that its parts took: linking its modules, making the driver's
+    module of them (parsed and validated), and the pipeline (translated and compiled).
+    """
+
+    label: str
+    link_ms: float
+    module_ms: float
+    pipeline_ms: float
+
+
+class _Recording(threading.local):
+    """What a thread records.
+
+    Attributes:
+        labels: of the passes that are timed.
+        submitted: likewise, of the last submit.
+        timed: whether its passes are: there is one set of timers.
+    """
+
+    def __init__(self) -> None:
+        self.encoder: Any = None
+        self.chain: Any = None
+        self.labels: list[str] = []
+        self.submitted: list[str] = []
+        self.timed = True
+
+
+def _of_thread(name: str) -> Any:
+    """An attribute that is each thread's own."""
+    return property(lambda gpu: getattr(gpu._recording, name), lambda gpu, value: setattr(gpu._recording, name, value))
 
 
 class Gpu(Closing):
@@ -206,7 +297,11 @@ class Gpu(Closing):
 
     Attributes:
         rank: its place among the adapters that are called the same.
+        built: the pipelines so far, in the order in which they were done.
     """
+
+    _encoder, _chain = _of_thread("encoder"), _of_thread("chain")
+    _labels, _submitted_labels = _of_thread("labels"), _of_thread("submitted")
 
     def __init__(self, adapter: str | None = None, *, rank: int = 0) -> None:
         alike = choose_adapters(adapter)
@@ -222,14 +317,15 @@ class Gpu(Closing):
         self.ledger = Ledger()
         self.part_bytes: int = self.limits["max-storage-buffer-binding-size"]
         self.linker = Linker.of_package()
-        self._programs: dict[Any, _Program] = {}
-        self._modules: dict[Any, tuple[Linked, Any]] = {}
+        self.built: list[Built] = []
+        self._programs: dict[_ProgramKey, _Program | Future[_Program]] = {}
+        self._builders = ThreadPoolExecutor(_threads(), thread_name_prefix="tyndall.pipelines")
+        self._waiting = _Waiting()
+        self._prepared: dict[Any, Any] = {}  # passes and pipelines with their groups, by all that they were made of
         self._samplers: dict[Any, Sampler] = {}
         self._constants: dict[int, Buffer] = {}
-        self._encoder: Any = None
-        self._chain: Any = None
+        self._recording = _Recording()
         self._timed = "timestamp-query" in self.features
-        self._labels: list[str] = []
         if self._timed:
             self._queries = self.device.create_query_set(type="timestamp", count=2 * _MAX_TIMED_PASSES)
             usage = wgpu.BufferUsage
@@ -244,7 +340,7 @@ class Gpu(Closing):
             self._timers = [Resource(self.ledger, "timers", native.label, size, native) for native in made]
             self._resolved, self._readback = (timer.native for timer in self._timers)
             self._period = _timestamp_period(self.device)
-        self._submitted_labels: list[str] = []
+        self._passes = Passes(self._queries if self._timed else None)
 
     @property
     def depth_format(self) -> str:
@@ -371,9 +467,11 @@ class Gpu(Closing):
             if len(raw) > _UPLOAD_CHUNK:
                 self.device.queue.submit([])
 
-    def clear_buffer(self, buffer: Buffer) -> None:
-        """Fill a buffer with zeros, between the passes recorded before and after."""
-        self.encoder.clear_buffer(buffer.native)
+    def clear_buffer(self, buffer: Buffer, offset: int = 0, size: int | None = None) -> None:
+        """Fill a buffer, or ``size`` bytes of it from ``offset`` on, with zeros, between the passes recorded before and
+        after.
+        """
+        self._record(lambda: self.encoder.clear_buffer(buffer.native, offset, size))
 
     def dtype(self, struct: str) -> np.dtype[Any]:
         """The numpy layout of a WESL struct, by its path."""
@@ -396,7 +494,8 @@ class Gpu(Closing):
         if value not in self._constants:
             data = np.array([value, 0, 0, 0], np.uint32)
             buffer = self.buffer(f"constant {value}", data, owner="constants", element="u32", usage="uniform")
-            self._constants[value] = buffer
+            if self._constants.setdefault(value, buffer) is not buffer:  # another thread was first
+                buffer.destroy()
         return self._constants[value].uniform()
 
     def sampler(
@@ -445,6 +544,7 @@ class Gpu(Closing):
     @property
     def encoder(self) -> Any:
         """The encoder of the passes since the last submit."""
+        self._catch_up()
         if self._encoder is None:
             self._encoder = self.device.create_command_encoder(label="tyndall")
             self._labels = []
@@ -452,15 +552,26 @@ class Gpu(Closing):
 
     def timestamps(self, label: str) -> dict[str, Any] | None:
         """Timestamp writes for a pass of this name; None where the adapter has no timers or too many passes ran."""
-        if not self._timed or len(self._labels) >= _MAX_TIMED_PASSES:
+        if (slot := self._timer(label)) is None:
             return None
-        slot = 2 * len(self._labels)
-        self._labels.append(label)
         return {
             "query_set": self._queries,
             "beginning_of_pass_write_index": slot,
             "end_of_pass_write_index": slot + 1,
         }
+
+    def _timer(self, label: str) -> int | None:
+        """The first of the two queries of a pass of this name."""
+        recording = self._recording
+        if not self._timed or not recording.timed or len(recording.labels) >= _MAX_TIMED_PASSES:
+            return None
+        recording.labels.append(label)
+        return 2 * len(recording.labels) - 2
+
+    def _begin_compute(self, label: str) -> Any:
+        """A new pass."""
+        encoder = self.encoder  # a new one begins a new list of timers
+        return self._passes.begin(encoder, label, self._timer(label))
 
     def compute(self, label: str, module: str, entry: str = "main") -> ComputePass:
         """A compute pass of one dispatch; see the module's docstring."""
@@ -469,14 +580,56 @@ class Gpu(Closing):
     @contextlib.contextmanager
     def chain(self, label: str) -> Iterator[None]:
         """One compute pass of this name around all that is dispatched inside the block, in order, timed as one."""
-        encoder = self.encoder
-        stamps = self.timestamps(label)
-        self._chain = encoder.begin_compute_pass(label=label, **({"timestamp_writes": stamps} if stamps else {}))
+        self._record(partial(self._begin_chain, label))
         try:
             yield
         finally:
-            self._chain.end()
-            self._chain = None
+            self._record(self._end_chain)
+
+    def _begin_chain(self, label: str) -> None:
+        self._chain = self._begin_compute(label)
+
+    def _end_chain(self) -> None:
+        chain, self._chain = self._chain, None
+        self._passes.end(chain)
+
+    @property
+    def _kept(self) -> list[Callable[[], object]] | None:
+        return self._waiting.kept
+
+    @contextlib.contextmanager
+    def together(self) -> Iterator[None]:
+        """Build the pipelines that passes inside the block still lack side by side, each in a thread of its own.
+
+        What is recorded from the first of these passes on waits, in order, and is recorded at the block's end, or when
+        it is submitted or the encoder asked for. So what is wrong with a shader is raised there, on the caller's
+        thread, and what has been recorded since the last submit is forgotten then.
+        """
+        if self._kept is not None:
+            yield
+            return
+        self._waiting.kept = []
+        try:
+            yield
+            self._catch_up()
+        except BaseException:
+            self.discard()
+            raise
+        finally:
+            self._waiting.kept = None
+
+    def _record(self, record: Callable[[], object], *, ready: bool = True) -> None:
+        """Record something now, or in its turn where something before it, or itself, waits for a pipeline."""
+        if self._kept is None or (ready and not self._kept):
+            record()
+        else:
+            self._kept.append(record)
+
+    def _catch_up(self) -> None:
+        if self._kept:
+            kept, self._waiting.kept = self._kept, []
+            for record in kept:
+                record()
 
     @contextlib.contextmanager
     def render(
@@ -522,14 +675,26 @@ class Gpu(Closing):
                 if stencil is None
                 else {"stencil_load_op": "clear", "stencil_store_op": "store", "stencil_clear_value": stencil}
             )
-        encoder = self.encoder
-        if (stamps := self.timestamps(label)) is not None:
-            descriptor["timestamp_writes"] = stamps
-        native = encoder.begin_render_pass(**descriptor)
+        if self._kept:
+            calls = _Calls()
+            yield calls
+            self._kept.append(partial(self._render, descriptor, calls))
+            return
+        native = self._begin_render(descriptor)
         try:
             yield native
         finally:
             native.end()
+
+    def _begin_render(self, descriptor: dict[str, Any]) -> Any:
+        encoder = self.encoder
+        stamps = self.timestamps(descriptor["label"])
+        return encoder.begin_render_pass(**descriptor, **({"timestamp_writes": stamps} if stamps else {}))
+
+    def _render(self, descriptor: dict[str, Any], calls: _Calls) -> None:
+        native = self._begin_render(descriptor)
+        calls.repeat(native)
+        native.end()
 
     def raster(
         self,
@@ -545,8 +710,12 @@ class Gpu(Closing):
         """(pipeline, bind group) for drawing; record them into a render pass or a bundle."""
         bound = _all_bound(bindings)
         entries = (vertex,) if fragment is None else (vertex, fragment)
-        program = self._program(module, entries, bound, overlay or {}, features or {}, state)
-        return program.pipeline, self._group(program, bound)
+        key = _key(module, entries, bound, overlay or {}, features or {}, state)
+        made: tuple[Any, Any] | None = self._prepared.get(key)
+        if made is None:
+            program = self._program(_program_key(module, entries, bound, overlay or {}, features or {}, state))
+            made = self._prepare(key, (program.pipeline, self._group(program, bound)))
+        return made
 
     def bundle(self, label: str, state: Raster, *, depth_read_only: bool = False) -> Any:
         """A render bundle encoder for passes with the formats of ``state``: recorded once, replayed at no cost."""
@@ -557,8 +726,18 @@ class Gpu(Closing):
             depth_read_only=depth_read_only,
         )
 
+    @contextlib.contextmanager
+    def aside(self) -> Iterator[None]:
+        """This thread's passes inside the block are not timed: the timers are those of the thread that draws."""
+        before, self._recording.timed = self._recording.timed, False
+        try:
+            yield
+        finally:
+            self._recording.timed = before
+
     def submit(self) -> None:
         """Send the recorded passes to the device."""
+        self._catch_up()
         if self._encoder is None:
             return
         if self._labels:
@@ -571,11 +750,13 @@ class Gpu(Closing):
     @property
     def recording(self) -> bool:
         """Whether passes wait to be submitted."""
-        return self._encoder is not None
+        return self._encoder is not None or bool(self._kept)
 
     def discard(self) -> None:
         """Forget the passes recorded since the last submit."""
         self._encoder, self._chain, self._labels = None, None, []
+        if self._kept:
+            self._kept.clear()
 
     def timings(self) -> list[tuple[str, float]]:
         """(name, milliseconds) of each pass of the last submit, and ("frame", first begin to last end). Waits for it.
@@ -613,22 +794,32 @@ class Gpu(Closing):
 
     # --- pipelines ------------------------------------------------------------------------------------------------
 
-    def _program(
-        self,
-        module: str,
-        entries: tuple[str, ...],
-        bound: Mapping[str, Bound],
-        overlay: Mapping[str, str],
-        features: Mapping[str, bool],
-        state: Raster | None,
-    ) -> _Program:
-        names = tuple(bound)
-        slots = tuple(b.slot for b in bound.values())
-        key = (module, entries, names, slots, tuple(overlay.items()), tuple(features.items()), state)
-        program = self._programs.get(key)
-        if program is None:
-            program = self._programs[key] = self._build(module, entries, names, slots, overlay, features, state)
+    def _program(self, key: _ProgramKey) -> _Program:
+        """A pipeline: the one that is there, or that is being built once it is, or else built now."""
+        found = self._programs.get(key)
+        if isinstance(found, _Program):
+            return found
+        if found is None:
+            program = self._build(*key)
+        else:
+            try:
+                program = found.result()
+            except BaseException:
+                self._programs.pop(key, None)  # to be tried anew
+                raise
+        self._programs[key] = program
         return program
+
+    def _begun(self, key: _ProgramKey) -> _Program | None:
+        """A pipeline; inside :meth:`together` None while it is being built."""
+        found = self._programs.get(key)
+        if isinstance(found, _Program):
+            return found
+        if self._kept is None:
+            return self._program(key)
+        if found is None:
+            self._programs[key] = self._builders.submit(self._build, *key)
+        return None
 
     def _build(
         self,
@@ -636,34 +827,37 @@ class Gpu(Closing):
         entries: tuple[str, ...],
         names: tuple[str, ...],
         slots: tuple[Slot, ...],
-        overlay: Mapping[str, str],
-        features: Mapping[str, bool],
+        overlay: tuple[tuple[str, str], ...],
+        features: tuple[tuple[str, bool], ...],
         state: Raster | None,
     ) -> _Program:
-        text = _bindings_module(names, slots)
-        linked = self.linker.link(module, entries, text, overlay, features)
+        # Runs in several threads at once: it may read the linker and call the device, and touch nothing else.
         label = f"{module.removeprefix('package::').replace('::', '/')}.{entries[0]}"
+        begin = perf_counter()
+        linked = self.linker.link(module, entries, _bindings_module(names, slots), dict(overlay), dict(features))
+        after_link = perf_counter()
         trusted = not any(slot.untrusted for slot in slots)
         native = create_module(self.device, self.linker, linked, label, trusted=trusted)
+        after_module = perf_counter()
         used = tuple((i, names[i]) for i in sorted(linked.used))
         layout_entries = [slots[i].entry(i) for i, _ in used]
-        if state is not None:
-            stages = wgpu.ShaderStage.VERTEX | wgpu.ShaderStage.FRAGMENT
-            for entry in layout_entries:
-                entry["visibility"] &= stages
-        else:
-            for entry in layout_entries:
-                entry["visibility"] &= wgpu.ShaderStage.COMPUTE
+        stages = wgpu.ShaderStage.VERTEX | wgpu.ShaderStage.FRAGMENT if state is not None else wgpu.ShaderStage.COMPUTE
+        for entry in layout_entries:
+            entry["visibility"] &= stages
         group_layout = self.device.create_bind_group_layout(label=label, entries=layout_entries)
         layout = self.device.create_pipeline_layout(label=label, bind_group_layouts=[group_layout])
         pipeline: Any
+        workgroup = (0, 0, 0)
         if state is None:
+            workgroup = self.linker.workgroup(linked, entries[0])
             pipeline = self.device.create_compute_pipeline(
                 label=label, layout=layout, compute={"module": native, "entry_point": entries[0]}
             )
         else:
             pipeline = self.device.create_render_pipeline(**_raster_descriptor(label, layout, native, entries, state))
-        return _Program(pipeline, group_layout, used, {})
+        times = (after_link - begin, after_module - after_link, perf_counter() - after_module)
+        self.built.append(Built(label, *(round(1e3 * seconds, 3) for seconds in times)))
+        return _Program(pipeline, group_layout, used, {}, workgroup)
 
     def _group(self, program: _Program, bound: Mapping[str, Bound]) -> Any:
         key = tuple(bound[name].key for _, name in program.used)
@@ -677,19 +871,37 @@ class Gpu(Closing):
             )
         return group
 
+    def _prepare[T](self, key: Any, made: T) -> T:
+        """Keep what a pass of the next frame looks up whole, without asking for its program and its group apart."""
+        if len(self._prepared) >= _MOST_PREPARED:
+            self._prepared.clear()
+        self._prepared[key] = made
+        return made
+
     def forget_groups(self) -> None:
         """Drop cached bind groups, so that destroyed resources are not kept alive by them."""
-        for program in self._programs.values():
-            program.groups.clear()
+        self._prepared.clear()
+        for program in list(self._programs.values()):  # other threads may add to them
+            if isinstance(program, _Program):
+                program.groups.clear()
+
+    def forget_programs(self, slot: Slot) -> None:
+        """Drop the pipelines of all shaders that were linked with what this slot declares and tells."""
+        self._prepared.clear()
+        for key in list(self._programs):
+            if slot in key[3]:
+                self._programs.pop(key, None)
 
     # --- life -----------------------------------------------------------------------------------------------------
 
     def close(self) -> None:
         """Free everything. The ledger then holds what others forgot to destroy."""
         self.discard()
+        self._builders.shutdown(cancel_futures=True)  # waits for what uses the device
         for buffer in self._constants.values():
             buffer.destroy()
         self._constants.clear()
+        self._prepared.clear()
         self._programs.clear()
         self._samplers.clear()
         if self._timed:
@@ -713,7 +925,10 @@ class ComputePass:
         """Give names to resources: a :class:`Bound`, :class:`Parts`, or a texture (sampled), buffer (read) or
         parameter buffer.
         """
-        self._bound.update(_all_bound({**(scope or {}), **resources}))
+        if scope:
+            self._bound.update(_all_bound(scope))
+        if resources:
+            self._bound.update(_all_bound(resources))
         return self
 
     def overlay(self, modules: Mapping[str, str]) -> Self:
@@ -728,9 +943,7 @@ class ComputePass:
 
     def dispatch(self, width: int, height: int = 1, depth: int = 1) -> None:
         """Run one thread for each element of the given size (rounded up to whole workgroups; the shader checks)."""
-        prepared = self.prepare()
-        x, y, z = prepared.workgroup
-        prepared.run(-(-width // x), -(-height // y), -(-depth // z))
+        self.prepare().over(width, height, depth)
 
     def dispatch_line(self, count: int) -> None:
         """Run one thread for each of ``count`` elements, in rows of :data:`LINE` workgroups: the limit of one dimension
@@ -740,53 +953,97 @@ class ComputePass:
 
     def prepare(self) -> Prepared:
         """The same pass, to be run many times at little cost."""
-        gpu = self._gpu
-        program = gpu._program(self._module, (self._entry,), self._bound, self._overlay, self._features, None)
-        group = gpu._group(program, self._bound)
-        return Prepared(gpu, self._label, program.pipeline, group, gpu.linker.workgroup(self._module, self._entry))
+        gpu, entries = self._gpu, (self._entry,)
+        key = _key(self._module, entries, self._bound, self._overlay, self._features, self._label)
+        made: Prepared | None = gpu._prepared.get(key)
+        if made is None:
+            program = _program_key(self._module, entries, self._bound, self._overlay, self._features, None)
+            made = gpu._prepare(key, Prepared(gpu, self._label, program, self._bound))
+        return made
 
 
-@dataclass(frozen=True)
 class Prepared:
     """A compute pass with its pipeline and bindings. It keeps what is bound alive, so it must not outlive that."""
 
-    gpu: Gpu
-    label: str
-    pipeline: Any
-    group: Any
-    workgroup: tuple[int, int, int]
+    def __init__(self, gpu: Gpu, label: str, key: _ProgramKey, bound: Mapping[str, Bound]) -> None:
+        self._gpu, self._label, self._key = gpu, label, key
+        self._program = gpu._begun(key)
+        self._group = gpu._group(self._program, bound) if self._program else None
+        self._bound = bound if self._program else dict(bound)
+
+    def _built(self) -> _Program:
+        if self._program is None:
+            self._program = self._gpu._program(self._key)
+            self._group = self._gpu._group(self._program, self._bound)
+        return self._program
+
+    @property
+    def workgroup(self) -> tuple[int, int, int]:
+        """The size of a workgroup. Waits for the pipeline."""
+        return self._built().workgroup
+
+    def over(self, width: int, height: int = 1, depth: int = 1) -> None:
+        """As :meth:`ComputePass.dispatch`."""
+
+        def dispatch(passes: Passes, native: Any, size: tuple[int, int, int]) -> None:
+            passes.dispatch(native, -(-width // size[0]), -(-height // size[1]), -(-depth // size[2]))
+
+        self._record(dispatch)
 
     def line(self, count: int) -> None:
         """As :meth:`ComputePass.dispatch_line`."""
-        groups = max(1, -(-count // self.workgroup[0]))
-        self.run(min(groups, LINE), -(-groups // LINE))
+
+        def dispatch(passes: Passes, native: Any, size: tuple[int, int, int]) -> None:
+            groups = max(1, -(-count // size[0]))
+            passes.dispatch(native, min(groups, LINE), -(-groups // LINE), 1)
+
+        self._record(dispatch)
 
     def run(self, x: int, y: int = 1, z: int = 1) -> None:
         """Run that many workgroups: in a pass of its own, or as part of the chain that is open."""
-        with self._pass() as native:
-            native.dispatch_workgroups(x, y, z)
+        self._record(lambda passes, native, _: passes.dispatch(native, x, y, z))
 
     def run_indirect(self, arguments: Buffer, offset: int = 0) -> None:
         """As :meth:`run`, of the three numbers of workgroups that stand in a buffer at a byte offset."""
-        with self._pass() as native:
-            native.dispatch_workgroups_indirect(arguments.native, offset)
+        self._record(lambda passes, native, _: passes.dispatch_indirect(native, arguments.native, offset))
 
-    @contextlib.contextmanager
-    def _pass(self) -> Iterator[Any]:
-        gpu = self.gpu
-        native = gpu._chain
-        if native is None:
-            encoder = gpu.encoder  # a new one begins a new list of timers
-            stamps = gpu.timestamps(self.label)
-            native = encoder.begin_compute_pass(label=self.label, **({"timestamp_writes": stamps} if stamps else {}))
-        native.set_pipeline(self.pipeline)
-        native.set_bind_group(0, self.group)
-        yield native
-        if gpu._chain is None:
-            native.end()
+    def _record(self, dispatch: Callable[[Passes, Any, tuple[int, int, int]], None]) -> None:
+        if self._program is not None and not self._gpu._kept:
+            self._encode(dispatch)
+        else:
+            self._gpu._record(partial(self._encode, dispatch), ready=self._program is not None)
+
+    def _encode(self, dispatch: Callable[[Passes, Any, tuple[int, int, int]], None]) -> None:
+        gpu, program = self._gpu, self._built()
+        native = gpu._chain or gpu._begin_compute(self._label)
+        try:
+            gpu._passes.use(native, program.pipeline, self._group)
+            dispatch(gpu._passes, native, program.workgroup)
+        finally:
+            if gpu._chain is None:
+                gpu._passes.end(native)
 
 
-def _all_bound(resources: Mapping[str, Any]) -> dict[str, Bound]:
+def _threads() -> int:
+    """How many pipelines are built at once: as many as the process has processors."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _key(
+    module: str,
+    entries: tuple[str, ...],
+    bound: Mapping[str, Bound],
+    overlay: Mapping[str, str],
+    features: Mapping[str, bool],
+    more: Any,
+) -> tuple[Any, ...]:
+    """What a pass is known by: bindings by their names and by what they are themselves, which the key keeps alive."""
+    return (module, entries, more, *bound, *bound.values(), *overlay.items(), *features.items())
+
+
+def _all_bound(resources: Mapping[str, Any]) -> Mapping[str, Bound]:
+    if set(map(type, resources.values())) == {Bound}:  # as it is in most passes
+        return resources
     bound: dict[str, Bound] = {}
     for name, value in resources.items():
         if type(value) is Bound:

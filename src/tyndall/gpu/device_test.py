@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import os
+import threading
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import props
 import pytest
+import wgpu
 
 from tyndall.frame import Renderer
 from tyndall.gpu import device
 from tyndall.gpu.device import Gpu, GpuError, adapters, choose_adapter, choose_adapters
-from tyndall.gpu.resources import BYTES_PER_TEXEL, texel_dtype
+from tyndall.gpu.resources import BYTES_PER_TEXEL, Buffer, texel_dtype
+from tyndall.gpu.shader import ShaderError
 from tyndall.scene.model import DirectionalLight, Medium, PointLight, Scene
 from tyndall.techniques import FAMILIES
 from tyndall.techniques.shadow.shadow_map import ShadowMap
@@ -281,6 +284,24 @@ def test_a_line_of_more_workgroups_than_one_dimension_holds(gpu: Gpu) -> None:
         gpu.forget_groups()
 
 
+def test_a_dispatch_beyond_the_limit_is_an_error_and_the_next_frame_is_well(gpu: Gpu) -> None:
+    values = np.arange(8, dtype=np.uint32)
+    with (
+        gpu.buffer("values", values, owner="test") as source,
+        gpu.buffer("doubled", values, owner="test") as target,
+        props.module(gpu, "double_limit", _DOUBLE) as path,
+    ):
+        scope = {"values": source.split(), "doubled": target.split(write=True), "count": gpu.constant(8)}
+        prepared = gpu.compute("test.double", path).bind(scope).prepare()
+        prepared.run(1 << 20)
+        with pytest.raises(wgpu.GPUError, match="dispatch group size"):
+            gpu.submit()
+        gpu.discard()
+        prepared.run(1)
+        assert (gpu.read_buffer(target)[:8] == 3 * values).all()
+        gpu.forget_groups()
+
+
 _COUNT = """
 import package::bindings::{arguments, window};
 @compute @workgroup_size(4)
@@ -311,3 +332,132 @@ def test_a_shader_tells_how_many_workgroups_run(gpu: Gpu) -> None:
         assert found[64] == 3 * 2 * 4
         assert found.sum() == found[64]
         gpu.forget_groups()
+
+
+# --- pipelines that are built side by side ------------------------------------------------------------------------
+
+
+def _steps(count: int) -> str:
+    return "import package::bindings::out;\n" + "".join(
+        f"@compute @workgroup_size(8, 4)\n"
+        f"fn step{k}(@builtin(local_invocation_index) i: u32) {{ out[i] = 3u * out[i] + {k}u; }}\n"
+        for k in range(count)
+    )
+
+
+def _together(gpu: Gpu, path: str, names: list[str], out: Buffer) -> None:
+    with gpu.together():
+        for name in names:
+            gpu.compute(name, path, name).bind(out=out.read_write()).dispatch(8, 4)
+
+
+def _value(count: int, start: int = 0) -> int:
+    value = start
+    for k in range(count):
+        value = (3 * value + k) % 2**32
+    return value
+
+
+def test_passes_recorded_together_run_in_order(gpu: Gpu) -> None:
+    """Passes whose pipelines are still being built, chains and what is ready between them: as if one after another."""
+    with gpu.buffer("test.out", 128, owner="test") as out, props.module(gpu, "test_together", _steps(8)) as path:
+        compute = [gpu.compute(f"step {k}", path, f"step{k}").bind(out=out.read_write()) for k in range(8)]
+        compute[3].prepare()  # is there before
+        with gpu.together():
+            gpu.clear_buffer(out)
+            compute[0].dispatch(8, 4)
+            with gpu.chain("chained"):
+                for one in compute[1:4]:
+                    one.dispatch(8, 4)
+            for one in compute[4:7]:
+                one.dispatch_line(8)
+            prepared = compute[7].prepare()
+            prepared.run(1)
+            assert gpu.recording
+            assert prepared.workgroup == (8, 4, 1)
+        assert (gpu.read_buffer(out) == _value(8)).all()
+        assert {label for label, _ in gpu.timings()} <= {"chained", "frame", *(f"step {k}" for k in range(8))}
+        names = [each.label.rpartition(".")[2] for each in gpu.built[-8:]]
+        assert sorted(names) == [f"step{k}" for k in range(8)]
+        with gpu.together():
+            prepared.run(1)
+            gpu.clear_buffer(out, 64, 64)
+            assert list(gpu.read_buffer(out)[::16]) == [3 * _value(8) % 2**32 + 7, 0]  # reading catches up
+        gpu.forget_groups()
+
+
+def test_drawing_waits_for_passes_before_it(gpu: Gpu) -> None:
+    """A target is cleared after the pass that reads it, though that has no pipeline when it is recorded."""
+    text = """
+        import package::bindings::{out, shown};
+        @compute @workgroup_size(1) fn keep() { out[0] = textureLoad(shown, vec2u(0, 0), 0).x; }
+    """
+    with (
+        gpu.buffer("test.out", 16, owner="test", element="f32") as out,
+        gpu.texture("test.target", (1, 1), "r32float", owner="test", usage="sampled target") as target,
+        props.module(gpu, "test_drawn_after", text) as path,
+    ):
+        gpu.write_texture(target, np.full((1, 1, 1), 5, np.float32))
+        with gpu.together():
+            gpu.compute("keep", path, "keep").bind(out=out.read_write(), shown=target).dispatch(1)
+            with gpu.render("cleared", [(target.view(), (2.0, 0, 0, 0))]) as native:
+                native.set_viewport(0, 0, 1, 1, 0, 1)
+        assert gpu.read_buffer(out).view(np.float32)[0] == 5
+        assert gpu.read_texture(target)[0, 0, 0] == 2
+        gpu.forget_groups()
+
+
+def test_faults_of_shaders_built_together_are_raised_where_they_are_asked_for(gpu: Gpu) -> None:
+    text = _steps(2) + "@compute @workgroup_size(1)\nfn wrong() {\n    let a = vec3f(1.0);\n    out[0] = a;\n}\n"
+    with gpu.buffer("test.out", 128, owner="test") as out, props.module(gpu, "test_wrong_together", text) as path:
+        gpu.write(out, np.ones(32, np.uint32))
+        for _ in range(2):  # what failed is tried again
+            with pytest.raises(ShaderError, match=r"^test_wrong_together\.wesl:8:5: "):
+                _together(gpu, path, ["step0", "wrong", "step1"], out)
+            assert not gpu.recording, "what was recorded with it is forgotten"
+        assert (gpu.read_buffer(out) == 1).all()
+        _together(gpu, path, ["step1"], out)
+        assert (gpu.read_buffer(out) == 4).all()
+        gpu.forget_groups()
+
+
+def test_a_device_that_is_closed_waits_for_pipelines() -> None:
+    with Gpu() as own, own.buffer("test.out", 128, owner="test") as out:
+        with props.module(own, "test_closed", _steps(12)) as path, pytest.raises(ShaderError, match="nothing"):
+            _together(own, path, ["nothing", *(f"step{k}" for k in range(12))], out)
+        own.forget_groups()
+    assert len(own.built) <= 12
+    with pytest.raises(RuntimeError, match="shutdown"):
+        own._builders.submit(int)
+
+
+def test_threads_record_for_themselves_and_share_what_is_cached(gpu: Gpu) -> None:
+    """What one discards, another still submits; what one has compiled, another finds; one of them has the timers."""
+    seen: list[Any] = []
+    quick: dict[str, Any] = {"volumetric": "off", "shadow": ShadowMap(size=16), "antialiasing": "none"}
+
+    def aside() -> None:
+        with gpu.aside(), Renderer(LIT_WALL, (8, 6), gpu=gpu, **quick) as renderer:
+            assert not gpu.recording
+            renderer.draw()
+            seen.append((len(gpu._programs), gpu.timings(), renderer.radiance()))
+
+    with Renderer(LIT_WALL, (8, 6), gpu=gpu, **quick) as renderer, gpu.buffer("b", 16, owner="test") as buffer:
+        gpu.write(buffer, np.full(4, 7, np.uint32))
+        for _ in range(2):  # some passes are of a first frame
+            renderer.draw()
+        timed = [name for name, _ in gpu.timings()]
+        gpu.clear_buffer(buffer)
+        thread = threading.Thread(target=aside)
+        thread.start()
+        thread.join()
+        assert gpu.recording
+        assert (gpu.read_buffer(buffer) == 0).all()
+        renderer.draw()
+        assert [name for name, _ in gpu.timings()] == timed
+        (programs, untimed, radiance) = seen[0]
+        assert programs == len(gpu._programs)
+        assert untimed == []
+        renderer.restart()
+        renderer.draw()
+        np.testing.assert_array_equal(radiance, renderer.radiance())

@@ -138,17 +138,17 @@ class Ledger:
 
     def __iter__(self) -> Iterator[tuple[str, str, int]]:
         """(owner, label, bytes) of each resource."""
-        return iter(self._entries.values())
+        return iter(list(self._entries.values()))  # another thread may add to them
 
     @property
     def total(self) -> int:
         """Bytes of everything."""
-        return sum(size for _, _, size in self._entries.values())
+        return sum(size for _, _, size in self)
 
     def by_owner(self) -> dict[str, int]:
         """Bytes by owner."""
         totals: Counter[str] = Counter()
-        for owner, _, size in self._entries.values():
+        for owner, _, size in self:
             totals[owner] += size
         return dict(totals)
 

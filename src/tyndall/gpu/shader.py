@@ -31,6 +31,8 @@ _VIRTUAL_IMPORT = re.compile(
     r"import\s+(package::(?:bindings|visibility|surface_visibility|occlusion))::(\{[^}]*\}|\w+)\s*;"
 )
 _ATTRIBUTE = re.compile(r"@\w+(?:\([^)]*\))?\s*")
+_SWITCH = re.compile(r"^const (\w+) = (true|false);$", re.MULTILINE)
+_WORKGROUP = re.compile(r"@workgroup_size\s*\(((?:\s*\d+[iu]?\s*,?)+)\)")
 _DECLARATION = re.compile(r"(?:fn|struct|const|override|var(?:<[^>]*>)?)\s+(\w+)")
 # Line numbers of the driver's report. A fault of grammar has its place in the heading, "┌─ wgsl:4:5"; a fault of
 # meaning names the function there, and underlines what it found, of which the last is the statement that failed.
@@ -60,7 +62,6 @@ class Linker:
     modules: dict[str, str] = field(default_factory=dict)
     filenames: dict[str, str] = field(default_factory=dict)
     _dtypes: dict[str, np.dtype[Any]] = field(default_factory=dict, repr=False)
-    _workgroups: dict[tuple[str, str], tuple[int, int, int]] = field(default_factory=dict, repr=False)
 
     @classmethod
     def of_package(cls, package: str = "tyndall") -> Linker:
@@ -82,18 +83,31 @@ class Linker:
     def dtype(self, path: str) -> np.dtype[Any]:
         """The numpy layout of a WESL struct, ``package::wesl::light::Light``; its itemsize is the array stride."""
         if path not in self._dtypes:
-            self._dtypes[path] = wesl.reflect.numpy_dtype(self._compiler, path)
+            self._dtypes[path] = self._layout_alone(path) or wesl.reflect.numpy_dtype(self._compiler, path)
         return self._dtypes[path]
 
-    def workgroup(self, module: str, entry: str) -> tuple[int, int, int]:
+    def _layout_alone(self, path: str) -> np.dtype[Any] | None:
+        """The layout of a struct that needs nothing else of its module, whose imports would all be parsed."""
+        module, _, name = path.rpartition("::")
+        struct = re.search(rf"^struct {name} {{[^}}]*}}", self.modules.get(module, ""), re.MULTILINE)
+        if struct is None or "@if" in struct[0]:
+            return None
+        try:
+            return wesl.reflect.numpy_dtype(wesl.Compiler(modules={module: struct[0]}), path)
+        except wesl.CompileError:
+            return None
+
+    def workgroup(self, linked: Linked, entry: str) -> tuple[int, int, int]:
         """The workgroup size of a compute entry point."""
-        if (module, entry) in self._workgroups:
-            return self._workgroups[module, entry]
-        for point in wesl.reflect.classify_entry_points(self._compiler, module):
+        head = re.search(rf"((?:@\w+\s*(?:\([^)]*\))?\s*)+)fn\s+{entry}\b", linked.wgsl)
+        size = _WORKGROUP.search(head[1]) if head else None
+        if size:  # plain numbers; asking the linker takes as long as linking
+            x, y, z = (int(number) for number in (*re.findall(r"\d+", size[1]), 1, 1)[:3])
+            return x, y, z
+        for point in wesl.reflect.classify_entry_points(self._compiler, linked.module):
             if point.fn_name == entry and point.workgroup_size is not None:
-                self._workgroups[module, entry] = point.workgroup_size
                 return point.workgroup_size
-        raise ShaderError(f"{self.filenames.get(module, module)}:1:1: no compute entry point '{entry}'")
+        raise ShaderError(f"{self.filenames.get(linked.module, linked.module)}:1:1: no compute entry point '{entry}'")
 
     def link(
         self,
@@ -108,7 +122,8 @@ class Linker:
         Args:
             module: root module, ``package::…``.
             entries: names of the entry points to keep.
-            bindings: text of ``package::bindings``.
+            bindings: text of ``package::bindings``. Its ``const NAME = true;`` are switches as well, so that a shader
+                may leave out what it will not reach: the driver translates all that is there.
             overlay: virtual module name → real module name.
             features: switches for ``@if``.
 
@@ -120,7 +135,8 @@ class Linker:
         for alias, real in overlay.items():
             modules[alias], names[alias] = self.modules[real], self.filenames[real]
         try:
-            result = wesl.compile(modules, root=module, keep=list(entries), filenames=names, features=dict(features))
+            switches = {name: value == "true" for name, value in _SWITCH.findall(bindings)} | dict(features)
+            result = wesl.compile(modules, root=module, keep=list(entries), filenames=names, features=switches)
         except wesl.CompileError as error:
             raise ShaderError(_describe(error, names.get(module, module))) from None
         used = frozenset(int(n) for n in _USED.findall(result.wgsl))

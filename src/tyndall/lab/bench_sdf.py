@@ -28,7 +28,7 @@ import dataclasses
 import os
 import time
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from datetime import date
 from functools import partial
@@ -70,7 +70,7 @@ CHANGES: Mapping[str, Mapping[str, Any]] = {"field": {"cones": 1}, "field_ao": {
 BATCH = 32  # frames between two waits, where frames per second are counted
 STEP = 1 / 60  # s of a scene's own time from frame to frame
 _MOST_LITERAL = 2000  # primitives; a compiler has no end with more
-_SMALL = 64, 36  # pixels of a picture for whose sake a loop is compiled
+_TURN = 20.0  # s that a loop takes at most, beside its measurement, when it is its turn to draw
 
 Progress = Callable[[float, str], object]
 Row = dict[str, Any]
@@ -265,34 +265,43 @@ class _Run:
 
     def _loops(self) -> None:
         s = self._s
-        swarms = [f"swarm:{count}" for count in s.swarm]
-        codes = [f"swarm:{count}" for count in s.swarm if count <= _MOST_LITERAL]
-        orders = [("swarm", name, True) for name in swarms]
-        orders += [("scenes", name, False) for name in s.scenes] + [("swarm", name, False) for name in codes]
         stages = ("fragment", "compute")
-        compiled = self._compiled([Order(name, stage) for _, name, listed in orders if not listed for stage in stages])
-        for part, name, listed in orders:
-            for stage in stages:
-                self._loop(part, Order(name, stage, loops=listed), compiled.get((name, stage)))
-        for count in s.swarm:
-            if count > _MOST_LITERAL:
-                for stage in stages:
-                    reason = f"not tried: {count:,} as code"
-                    self._row("swarm", f"swarm:{count}").setdefault("loop", {})[stage] = {"failed": reason}
-
-    def _compiled(self, orders: Sequence[Order]) -> dict[tuple[str, str], Row]:
-        """What compiling literal code takes, all of it at once, since each compiler is one thread that takes minutes.
-
-        The driver keeps the results on disk, where the processes that measure find them.
-        """
-        s = self._s
-        if not s.processes or not orders:
-            return {}
-        self._progress(self._done / self._planned, f"compiling {len(orders)} loops at once")
-        small = [dataclasses.replace(order, size=_SMALL, adapter=self.document["adapter"]) for order in orders]
+        swarms = [("swarm", f"swarm:{count}") for count in s.swarm]
+        literal = [(p, n) for p, n in swarms if int(n.partition(":")[2]) <= _MOST_LITERAL]
+        codes = [
+            (p, self._sized(Order(n, w))) for p, n in [*(("scenes", n) for n in s.scenes), *literal] for w in stages
+        ]
+        limit = s.timeout + (s.loop_seconds + _TURN) * len(codes)
+        # Literal code takes a compiler of one thread minutes: all of it at once, while nothing else is measured.
         with ThreadPoolExecutor(max(1, (os.cpu_count() or 1) - 1)) as pool:
-            found = list(pool.map(partial(in_a_process, timeout=s.timeout), small))
-        return {(order.scene, order.who): row for order, row in zip(orders, found, strict=True)}
+            begun: dict[Future[Row], tuple[str, Order]] = {}
+            for part, order in codes if s.processes else ():
+                begun[pool.submit(in_a_process, order, timeout=limit, keep_compiled=False)] = part, order
+            self._progress(self._done / self._planned, f"compiling {len(begun)} loops at once")
+            for future in as_completed(begun):
+                self._loop(*begun[future], future)
+        for part, order in () if s.processes else codes:
+            self._loop(part, order)
+        for part, name in swarms:
+            for stage in stages:
+                self._loop(part, self._sized(Order(name, stage, loops=True)))
+        for part, name in swarms:
+            if (part, name) not in literal:
+                for stage in stages:
+                    reason = f"not tried: {name.partition(':')[2]} primitives as code"
+                    self._row(part, name).setdefault("loop", {})[stage] = {"failed": reason}
+
+    def _sized(self, order: Order) -> Order:
+        s = self._s
+        return dataclasses.replace(
+            order,
+            size=s.size,
+            seconds=s.loop_seconds,
+            frames=s.frames,
+            adapter=self.document["adapter"],
+            patience=s.timeout if s.processes and not order.loops else 0.0,
+            in_turn=not order.loops,
+        )
 
     def _row(self, part: str, name: str) -> Row:
         """The row of a scene, anew or as it is so far."""
@@ -347,21 +356,14 @@ class _Run:
             "frames": taken.frames,
         }
 
-    def _loop(self, part: str, order: Order, compiled: Row | None) -> None:
-        s, name = self._s, order.scene
-        order = dataclasses.replace(
-            order, size=s.size, seconds=s.loop_seconds, frames=s.frames, adapter=self.document["adapter"]
-        )
+    def _loop(self, part: str, order: Order, begun: Future[Row] | None = None) -> None:
+        name = order.scene
         row = self._row(part, name)
 
         def found() -> Row:
             scene = self._scene(name)
             row.update(facts(scene))
-            if compiled is None:
-                return run(order, self._gpu, scene)
-            if "failed" in compiled:
-                return compiled
-            return {**in_a_process(order, timeout=s.timeout), "compile_ms": compiled["compile_ms"]}
+            return begun.result() if begun is not None else run(order, self._gpu, scene)
 
         text = f"{name} as {'a list' if order.loops else 'code'}, {order.who}"
         self._step(text)

@@ -220,6 +220,9 @@ def _first(document: Document) -> str:
         "device ms",
         "scene ms",
         "first picture, ms",
+        "until it is set up",
+        "recorded",
+        "slowest pipeline, ms",
         "the next renderer's, ms",
         "process ms",
     ]
@@ -227,14 +230,18 @@ def _first(document: Document) -> str:
     for row in document["first"]:
         for kind, name in _FIRST.items():
             if found := row.get(kind):
-                keys = ("device_ms", "scene_ms", "first_ms", "warm_ms", "process_ms")
-                cells = (
-                    [_ms(found.get(key), 0) for key in keys] if "failed" not in found else [found["failed"], *"––––"]
-                )
+                keys = ("device_ms", "scene_ms", "first_ms", "setup_ms", "record_ms", "warm_ms", "process_ms")
+                if "failed" in found:
+                    cells = [found["failed"], *"–––––––"]
+                else:
+                    cells = [_ms(found.get(key), 0) for key in keys]
+                    slowest = [f"{ms:,.0f} (`{label}`)" for label, ms in found.get("slowest", {}).items()]
+                    cells.insert(5, ", ".join(slowest) or "–")
                 rows.append([f"`{row['scene']}`", f"{row['nodes']:,}", name, *cells])
     text = (
         "From a scene and a device until a picture is there, the compiling of all pipelines in it; and the same again "
-        "on the same device. A process also imports, makes its device and models the scene."
+        "on the same device. Pipelines are built side by side, in as many threads as there are processors, while the "
+        "first frame is recorded. A process also imports, makes its device and models the scene."
     )
     return f"### First picture\n\n{text}\n\n{_table(heading, rows)}"
 

@@ -8,13 +8,16 @@ what the driver keeps on disk.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import subprocess
 import sys
+import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,9 +25,10 @@ _BEGIN = time.perf_counter()
 
 import tyndall  # noqa: E402
 from tyndall.frame import Renderer  # noqa: E402
-from tyndall.gpu.device import Gpu  # noqa: E402
+from tyndall.gpu.device import Built, Gpu  # noqa: E402
 from tyndall.lab.baseline import Baseline, Loop  # noqa: E402
 from tyndall.lab.busy import Busy  # noqa: E402
+from tyndall.lab.filelock import device_lock  # noqa: E402
 from tyndall.lab.measure import Times, measure  # noqa: E402
 from tyndall.lab.scenes import open_scene  # noqa: E402
 from tyndall.scene.model import Scene  # noqa: E402
@@ -32,6 +36,7 @@ from tyndall.techniques import FAMILIES  # noqa: E402
 
 SLOW_MS = 1500.0  # a frame of the plain loop that would take longer is measured smaller
 _SMALLER = 4  # as wide and high
+_IMPATIENT = 75  # the status of a process whose patience has ended
 
 
 @dataclass(frozen=True)
@@ -44,6 +49,8 @@ class Order:
         seconds: of measuring frames; 0: the first picture alone.
         techniques: of our frame, by family.
         changes: their parameters, by technique.
+        patience: seconds until the pipelines are there, if not 0; then the process ends.
+        in_turn: processes that were told so compile at the same time, but only one of them draws.
     """
 
     scene: str
@@ -55,6 +62,8 @@ class Order:
     adapter: str | None = None
     techniques: Mapping[str, str] | None = None
     changes: Mapping[str, Mapping[str, Any]] | None = None
+    patience: float = 0.0
+    in_turn: bool = False
 
 
 def techniques_of(
@@ -69,14 +78,20 @@ def run(order: Order, gpu: Gpu | None = None, scene: Scene | None = None) -> dic
 
     Returns:
         ``first_ms``: from a scene and a device to a picture; ``compile_ms`` of it for the plain loop; ``warm_ms``: the
-        same again, with pipelines that the device has; ``device_ms`` and ``import_ms`` before it, where the process
-        begins with them; ``frame_ms``.
+        same again, with pipelines that the device has; ``import_ms``, ``device_ms`` and ``scene_ms`` before it, where
+        the process begins with them; ``frame_ms``. Parts of ``first_ms``: ``setup_ms`` until there is a renderer,
+        ``record_ms`` until its first frame is recorded, which waits for pipelines; ``link_ms``, ``modules_ms`` and
+        ``pipelines_ms`` are what all ``pipelines`` together took, in as many threads as there are, and ``slowest`` is
+        the one that took longest, with its milliseconds.
     """
     size = (int(order.size[0]), int(order.size[1]))
     made = gpu is None
     begin = time.perf_counter()
     device = gpu or Gpu(order.adapter)
     found: dict[str, Any] = {}
+    turn = contextlib.ExitStack()
+    end = threading.Timer(order.patience, partial(os._exit, _IMPATIENT))
+    end.daemon = True
     try:
         if made:
             device.wait()
@@ -85,19 +100,43 @@ def run(order: Order, gpu: Gpu | None = None, scene: Scene | None = None) -> dic
         described = scene or open_scene(order.scene)
         found["scene_ms"] = _since(begin)
         for name in ("first_ms", "warm_ms"):
-            begin = time.perf_counter()
+            begin, before = time.perf_counter(), len(device.built)
+            if order.patience > 0 and name == "first_ms":
+                end.start()
             with _make(order, device, described, size) as drawn:
+                setup_ms = _since(begin)
+                end.cancel()
+                if order.in_turn and name == "first_ms":
+                    asked = time.perf_counter()
+                    turn.enter_context(device_lock(f"pictures of {order.adapter}"))
+                    begin += time.perf_counter() - asked
                 drawn.draw()
+                record_ms = round(_since(begin) - setup_ms, 3)
                 device.wait()
                 found[name] = _since(begin)
+                if name == "first_ms":
+                    found |= {"setup_ms": setup_ms, "record_ms": record_ms, **_parts(device.built[before:])}
                 if name == "first_ms" and isinstance(drawn, Baseline):
                     found["compile_ms"] = round(drawn.compile_ms, 3)
                 if name == "warm_ms" and order.seconds > 0:
                     found |= frames_of(order, device, described, drawn)
     finally:
+        turn.close()
         if made:
             device.close()
     return found
+
+
+def _parts(built: Sequence[Built]) -> dict[str, Any]:
+    """What pipelines took, all together, and the one that took longest."""
+    sums = {
+        "link_ms": round(sum(each.link_ms for each in built), 3),
+        "modules_ms": round(sum(each.module_ms for each in built), 3),
+        "pipelines_ms": round(sum(each.pipeline_ms for each in built), 3),
+    }
+    took = {each.label: round(each.link_ms + each.module_ms + each.pipeline_ms, 3) for each in built}
+    slowest = max(took, key=lambda label: took[label], default=None)
+    return {"pipelines": len(built), **sums, "slowest": {slowest: took[slowest]} if slowest else {}}
 
 
 def _make(order: Order, gpu: Gpu, scene: Scene, size: tuple[int, int], settings: Loop | None = None) -> Any:
@@ -158,6 +197,8 @@ def in_a_process(order: Order, *, timeout: float = 120.0, keep_compiled: bool = 
     except subprocess.TimeoutExpired:
         return {"failed": f"no picture within {timeout:g} s", "timeout_s": timeout}
     lines = done.stdout.strip().splitlines()
+    if done.returncode == _IMPATIENT:
+        return {"failed": f"no picture within {order.patience:g} s", "timeout_s": order.patience}
     if done.returncode or not lines:
         said = done.stderr.strip().splitlines()
         return {"failed": said[-1] if said else f"it ended with {done.returncode}"}

@@ -435,23 +435,25 @@ class Implicit:
     def __post_init__(self) -> None:
         if getattr(self.shape, "dimension", None) != 3:
             raise ParameterError(f"shape: {type(self.shape).__name__} is no solid shape; extrude or revolve a flat one")
-        matrix = np.asarray(self.transform, np.float64)
-        if matrix.shape != (4, 4) or not np.isfinite(matrix).all() or abs(np.linalg.det(matrix[:3, :3])) < 1e-30:
-            raise ParameterError("transform: not 4×4 finite numbers that have an inverse")
-        if not np.array_equal(matrix[3], (0, 0, 0, 1)):
-            raise ParameterError("transform: its last row is not 0, 0, 0, 1")
-        rows = tuple(tuple(float(x) for x in row) for row in matrix)
+        rows = tuple(tuple(float(x) for x in row) for row in placement(self.transform))
         object.__setattr__(self, "transform", rows)
 
     @cached_property
     def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
         """Lower and upper corner in the world, each (3,); None where it has no end."""
-        low, high = self.shape.box
-        if not (np.isfinite(low).all() and np.isfinite(high).all()):
+        return self.bounds_at(np.asarray(self.transform))
+
+    def bounds_at(self, matrix: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+        """:attr:`bounds` where its transform is this 4×4 one."""
+        if self._corners is None:
             return None
-        matrix = np.asarray(self.transform)
-        world = box_corners(low, high) @ matrix[:3, :3].T + matrix[:3, 3]
+        world = self._corners @ matrix[:3, :3].T + matrix[:3, 3]
         return world.min(axis=0), world.max(axis=0)
+
+    @cached_property
+    def _corners(self) -> NDArray[np.float64] | None:
+        low, high = self.shape.box
+        return box_corners(low, high) if np.isfinite(low).all() and np.isfinite(high).all() else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -617,6 +619,20 @@ class Scene:
         except StopIteration:
             raise ParameterError("motion: fewer transforms than objects or parts of the name") from None
         return self.with_(implicits=tuple(moved), motion=None)
+
+
+def placement(transform: ArrayLike) -> NDArray[np.float64]:
+    """A copy of a 4×4 affine transform, as an array.
+
+    Raises:
+        ParameterError: it is none, or has no inverse.
+    """
+    matrix = np.array(transform, np.float64)
+    if matrix.shape != (4, 4) or not np.isfinite(matrix).all() or abs(np.linalg.det(matrix[:3, :3])) < 1e-30:
+        raise ParameterError("transform: not 4×4 finite numbers that have an inverse")
+    if matrix[3].tolist() != [0, 0, 0, 1]:
+        raise ParameterError("transform: its last row is not 0, 0, 0, 1")
+    return matrix
 
 
 def translations(ways: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -6,12 +6,19 @@ Paulin, Thonat: *Lipschitz Pruning: Hierarchical Simplification of Primitive-Bas
 into 16³ cells, then each of them into 4³: 64³. A cell walks its parent's program at its centre and leaves
 out what cannot matter anywhere inside: of two joined values the one that is beyond the other by more than both can
 change. What stays is a handful of instructions, and its value in the cell is that of the whole, bit for bit up to
-rounding. Cells in which no surface can be hold no program, only the value at their centre.
+rounding. Cells in which no surface can be hold no program, only the value at their centre. Where a fine cell's program
+is still long, it is split once more, into eighths (``prune.wesl``). Below unions alone it is enough to compare every
+leaf with the least of all, which needs no walk from one instruction to the next (``unions.wesl``): so ten thousand
+primitives that all move are pruned anew in each frame.
 
 Practice. Each object (:class:`~tyndall.scene.model.Implicit`) has cells in its own space. So placing an object
 elsewhere is one buffer write, and nothing is pruned again; moving a part of it prunes that object alone. Programs of
 four instructions or fewer need no cells, and what has no end has none: all of its program is run. Lists that do not fit
 are the parent's, and where cells of all objects do not fit some have fewer: slower, never wrong.
+
+Parts that move in one frame are best given together (:meth:`Field.move_all`): their transforms are then inverted and
+written at once. Of many leaves that are only moved the places alone are sent, a tenth of what their slots hold, and the
+device puts them into the slots.
 
 What shaders need is in :attr:`Field.bindings`: five buffers, and in the bindings module itself a switch over the kinds
 of primitives that are in use.
@@ -22,6 +29,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -30,12 +38,14 @@ from numpy.typing import ArrayLike, NDArray
 from tyndall.gpu.device import ComputePass, Gpu, GpuError
 from tyndall.gpu.params import ParameterError, nearest
 from tyndall.gpu.resources import Buffer, Closing, ParamsBuffer, Resource
-from tyndall.scene.model import Implicit, Material, translations
+from tyndall.scene.model import Implicit, Material, placement, translations
+from tyndall.sdf import paint
 from tyndall.sdf.hull import Hull
 from tyndall.sdf.marching import Marching
 from tyndall.sdf.program import TURNED, Kinds, Leaf, Part, Program, compile_shape
-from tyndall.sdf.shading import Shadings
-from tyndall.sdf.shape import Box, Floats, Shape
+from tyndall.sdf.shading import ShadedMaterial, Shadings
+from tyndall.sdf.shading import validate as validate_shader
+from tyndall.sdf.shape import Box, Floats, Painted, Shape
 from tyndall.sdf.snippets import validate
 
 OWNER = "implicit"
@@ -51,6 +61,8 @@ _EIGHTHS = 512, 1 << 17, 1 << 20  # for each instruction, and at least and at mo
 _SPARE = 0.04  # of its longest side, by which an object's box grows beyond what it must hold
 _ROOMY = 1.5  # times what an object's longest side must hold, from where on it shrinks
 _LEAF_SLOTS = 7  # of a leaf with a name
+_MANY = 256  # leaves, from where on their places are sent alone, and put into their slots by the device
+_GAP = 256  # slots between two that move, for which they are written together
 _COUNTERS = 8  # of an object: entries used, overflows, words of marks used by a job, eighths used
 _LEAST_ENTRIES, _MOST_ENTRIES = 1 << 12, 1 << 23
 _AMPLE_ENTRIES = 1 << 21  # up to here twice as many for each instruction
@@ -65,7 +77,9 @@ _MOST_SLOTS = 1 << 24  # before samples, whose place is a float
 
 @dataclass(frozen=True, eq=False)
 class _Parts:
-    """The parts of one name in an object, as arrays over them; a copy of a part is one more of the same number."""
+    """The parts of a name in an object, or of several, as arrays over them; a copy of a part is one more of the same
+    number. Slots and instructions are those of the program; ``leaf_at`` are the leaves as a slice where they can be.
+    """
 
     name: str
     count: int
@@ -76,8 +90,10 @@ class _Parts:
     before: Floats
     after: Floats
     factors: Floats
-    rest: Floats
+    rest: Floats  # (3, N)
     flat: NDArray[np.bool_]
+    leaf_at: slice | NDArray[np.intp]
+    spans: tuple[tuple[int, int], ...]  # of slots, that are written when they move
     is_straight: bool
     is_in_order: bool
 
@@ -88,22 +104,84 @@ class _Parts:
 
         before, after = np.array([p.before for p in parts]), np.array([p.after for p in parts])
         linear = np.concatenate([before[:, :3, :3], after[:, :3, :3]])
-        numbers = integers(p.number for p in parts)
+        numbers, slots, leaves = (integers(getattr(p, what) for p in parts) for what in ("number", "slot", "leaf"))
         return cls(
             name,
             int(numbers.max()) + 1,
             numbers,
-            integers(p.slot for p in parts),
+            slots,
             integers(p.entry for p in parts),
-            integers(p.leaf for p in parts),
+            leaves,
             before,
             after,
             np.array([p.factor for p in parts]),
-            before[:, :3, 3] + after[:, :3, 3],
+            np.ascontiguousarray((before[:, :3, 3] + after[:, :3, 3]).T),
             np.array([p.flat for p in parts]),
+            _evenly(leaves),
+            ((int(slots.min()), int(slots.max()) + _LEAF_SLOTS),),
             bool((linear == np.eye(3)).all()) and all(p.leaf >= 0 for p in parts),
             bool((numbers == np.arange(len(parts))).all()),
         )
+
+    @classmethod
+    def joined(cls, sets: Sequence[_Parts]) -> _Parts:
+        """Those of several names, one after another, to be turned at once."""
+        if len(sets) == 1:
+            return sets[0]
+        arrays = ("numbers", "slots", "entries", "leaves", "before", "after", "factors", "flat")
+        together: dict[str, Any] = {what: np.concatenate([getattr(p, what) for p in sets]) for what in arrays}
+        spans: list[tuple[int, int]] = []
+        for low, high in sorted(span for parts in sets for span in parts.spans):
+            if spans and low - spans[-1][1] <= _GAP:  # a write costs as much as that many slots
+                spans[-1] = spans[-1][0], max(high, spans[-1][1])
+            else:
+                spans.append((low, high))
+        return cls(
+            name=", ".join(parts.name for parts in sets),
+            count=sum(parts.count for parts in sets),
+            rest=np.concatenate([parts.rest for parts in sets], axis=1),
+            leaf_at=together["leaves"],
+            spans=tuple(spans),
+            is_straight=all(parts.is_straight for parts in sets),
+            is_in_order=False,
+            **together,
+        )
+
+    @cached_property
+    def first_rows(self) -> NDArray[np.float32]:
+        """(N, 4): first slots of leaves, with their factors at rest and whichever places were put into them."""
+        made = np.zeros((len(self.slots), 4), np.float32)
+        made[:, 3] = self.factors
+        return made
+
+    @cached_property
+    def owned(self) -> NDArray[np.bool_]:
+        """Which of them are one leaf, whose transform is among its own slots."""
+        return self.leaves >= 0
+
+    @cached_property
+    def own(self) -> NDArray[np.intp]:
+        """First slots of leaves."""
+        return self.slots[self.owned]
+
+    @cached_property
+    def scopes(self) -> NDArray[np.intp]:
+        """First slots of transforms around more than a leaf."""
+        return self.slots[~self.owned]
+
+
+def _leaves_plane(moves: Floats) -> bool:
+    """Whether one of (N, 3 or 4, 3 or 4) turns what lies in the plane of x and y out of it."""
+    return bool(moves[:, 2, :2].any() or moves[:, :2, 2].any())
+
+
+def _evenly(numbers: NDArray[np.intp]) -> slice | NDArray[np.intp]:
+    """As a slice where they are evenly spaced: numpy copies along those many times faster."""
+    steps = np.diff(numbers)
+    step = int(steps[0]) if len(steps) else 1
+    if step < 1 or numbers[0] < 0 or (steps != step).any():
+        return numbers
+    return slice(int(numbers[0]), int(numbers[-1]) + 1, step)
 
 
 def _entries(instructions: int) -> int:
@@ -144,18 +222,41 @@ class _Object:
     eighths: int = 0
     dirty: bool = True
     moves: dict[str, Floats] = dataclasses.field(default_factory=dict)
+    edits: dict[str, dict[str, Any]] = dataclasses.field(default_factory=dict)
     parts: dict[str, _Parts] = dataclasses.field(default_factory=dict)
+    joined: dict[tuple[str, ...], _Parts] = dataclasses.field(default_factory=dict)
     turned: set[str] = dataclasses.field(default_factory=set)  # names of parts that are
     moved: bool = False  # since the box was fitted
     hull: Hull | None = None
     has_hull: bool = False  # was looked for
     jobs: list[Any] | None = None
-    halves: Floats | None = None  # of the leaves' boxes in their own spaces, and their middles
-    middles: Floats = dataclasses.field(default_factory=lambda: np.zeros((0, 3)))
+    halves: Floats | None = None  # (3, leaves) of the leaves' boxes in their own spaces, and their middles
+    middles: Floats = dataclasses.field(default_factory=lambda: np.zeros((3, 0)))
 
     def __post_init__(self) -> None:
-        self.placements = np.array([leaf.placement for leaf in self.program.leaves])
-        self.is_straight = bool((self.placements[:, :3, :3] == np.eye(3)).all())
+        self.at_rest = self.implicit.shape
+        # An edit changes leaves, and a field of the same shapes may come to have the same program.
+        self.program = dataclasses.replace(self.program, leaves=list(self.program.leaves))
+        self.placement = np.array(self.implicit.transform, np.float64)
+        placements = np.array([leaf.placement for leaf in self.program.leaves])
+        self.linear = placements[:, :3, :3].copy()  # of the leaves, and (3, leaves) where they are
+        self.places = np.ascontiguousarray(placements[:, :3, 3].T)
+        self.is_straight = bool((self.linear == np.eye(3)).all())
+
+    def together(self, sets: Sequence[_Parts]) -> _Parts:
+        """:meth:`_Parts.joined`, once for all frames."""
+        names = tuple(parts.name for parts in sets)
+        if names not in self.joined:
+            self.joined[names] = _Parts.joined(sets)
+        return self.joined[names]
+
+    def parts_of(self, name: str) -> _Parts:
+        """Its parts of a name that it has."""
+        if name not in self.parts:
+            if held := next((part.held for part in self.program.names[name] if part.held), ""):
+                raise ParameterError(f"{name}: it is inside of a {held}, which is made for where it is at rest")
+            self.parts[name] = _Parts.of(name, self.program.names[name])
+        return self.parts[name]
 
     def leaves(self) -> list[tuple[Leaf, float]]:
         """The leaves, each with what its values are multiplied by."""
@@ -189,6 +290,8 @@ class Field(Closing):
         implicits: the objects.
         marching: when a ray ends.
         pruning: False runs whole programs everywhere: slower, the same picture.
+        like: another field. Where this one has the same set of kinds, and stacks that are no deeper, its shaders are
+            the same text, whatever the order: nothing is compiled.
 
     Attributes:
         bindings: what shaders that ask the field must have in their scope.
@@ -208,21 +311,60 @@ class Field(Closing):
         marching: Marching | None = None,
         pruning: bool = True,
         owner: str = OWNER,
+        like: Field | None = None,
     ) -> None:
         self._gpu, self._owner, self._pruning = gpu, owner, pruning
         self._marching = marching or Marching()
-        self._kinds, self._shadings = Kinds(), Shadings()
+        self._kinds, self._shadings, self._stacks = Kinds(), Shadings(), (1, 1)
+        self._compiled: dict[int, tuple[Any, Program]] = {}  # by the shapes' ids
         self._buffers: list[Buffer] = []
         self._params: ParamsBuffer | None = None
         self._before_buffer: Buffer | None = None  # slots as they were when `remember` was called last
         self._is_remembered = self._is_known = False  # as they are now; as they were in some frame
         self._objects: list[_Object] = []
+        self._lists: dict[tuple[_Object, str], tuple[Buffer, Buffer]] = {}  # places and slots of many leaves of a name
+        self._listed: set[tuple[_Object, str]] = set()  # whose last motion was sent as such a list
+        self._waiting: set[tuple[_Object, str]] = set()  # and is not in the slots yet
+        self._jobs_written: list[list[Any]] = []  # what the jobs' buffer holds: in motion mostly what it is to hold
         self.uploaded = 0
         try:
-            self._upload(implicits)
+            self._upload(implicits, self._compile(implicits, like))
         except BaseException:
             self.close()
             raise
+
+    def _compile(self, implicits: Sequence[Implicit], like: Field | None) -> list[Program]:
+        """The objects' programs, with kinds and shaders numbered as another field has them if the set is the same."""
+        shapes: list[Any] = [one.shape for one in implicits]
+        kinds, programs = Kinds(like._kinds if like else None), []
+        for shape in shapes:
+            known = like._compiled.get(id(shape)) if like else None
+            if known is None:
+                programs.append(compile_shape(shape, kinds))
+            else:
+                programs.append(known[1])
+                kinds.ask(known[1])
+        if not kinds.is_tight:
+            kinds, programs = kinds.tightened(programs)
+        self._compiled = {id(shape): (shape, made) for shape, made in zip(shapes, programs, strict=True)}
+        materials = [m for one, made in zip(implicits, programs, strict=True) for m in (one.material, *made.materials)]
+        shaders = {m.shader for m in materials if isinstance(m, ShadedMaterial)}
+        others = like._shadings if like else None
+        self._kinds, self._shadings = kinds, Shadings(others if others and shaders >= set(others.shaders) else None)
+        for material in materials:
+            self._shadings.of(material)
+        self._stacks = max([1, *(p.values for p in programs)]), max([1, *(p.places for p in programs)])
+        if (
+            like
+            and self._knows_same(like)
+            and self._stacks[0] <= like._stacks[0]
+            and self._stacks[1] <= like._stacks[1]
+        ):
+            self._stacks = like._stacks
+        return programs
+
+    def _knows_same(self, like: Field) -> bool:
+        return self._kinds.wesl() == like._kinds.wesl() and self._shadings.wesl() == like._shadings.wesl()
 
     def _buffer(self, label: str, data: NDArray[Any] | int, element: str) -> Buffer:
         size = data if isinstance(data, int) else data.nbytes
@@ -238,12 +380,11 @@ class Field(Closing):
         self._gpu.write(buffer, data, offset)
         self.uploaded += data.nbytes
 
-    def _upload(self, implicits: Sequence[Implicit]) -> None:
+    def _upload(self, implicits: Sequence[Implicit], programs: Sequence[Program]) -> None:
         gpu = self._gpu
         words = slots = materials = cells = entries = 0
-        for left, implicit in zip(range(len(implicits))[::-1], implicits, strict=True):
+        for left, implicit, program in zip(range(len(implicits))[::-1], implicits, programs, strict=True):
             shape: Any = implicit.shape
-            program = compile_shape(shape, self._kinds)
             levels = self._levels(program, shape.box, gpu.part_bytes // 16 - cells - left * _COARSE**3)
             capacity = _entries(program.size) if levels else 0
             made = _Object(implicit, program, words, slots, materials, levels, cells, 0, capacity, shape.box)
@@ -345,8 +486,8 @@ class Field(Closing):
         programs = [o.program for o in self._objects]
         constants = {
             "IMPLICIT_OBJECTS": len(programs),
-            "IMPLICIT_VALUES": max([1, *(p.values for p in programs)]),
-            "IMPLICIT_PLACES": max([1, *(p.places for p in programs)]),
+            "IMPLICIT_VALUES": self._stacks[0],
+            "IMPLICIT_PLACES": self._stacks[1],
         }
         shaded = str(not self._shadings.is_trusted).lower()
         text = "\n".join(
@@ -375,9 +516,8 @@ class Field(Closing):
         made, row = self._objects[index], self._rows[index]
         made.jobs = None
         program = made.program
-        placement = np.asarray(made.implicit.transform, np.float64)
-        row["to_local"] = np.linalg.inv(placement)[:3]
-        row["factor"] = np.linalg.svd(placement[:3, :3], compute_uv=False)[-1]
+        row["to_local"] = np.linalg.inv(made.placement)[:3]
+        row["factor"] = np.linalg.svd(made.placement[:3, :3], compute_uv=False)[-1]
         low, high = made.box
         longest = float(np.max(high - low)) if np.isfinite(high - low).all() else 0.0
         margin = _MARGIN * longest
@@ -426,9 +566,11 @@ class Field(Closing):
 
     def place(self, index: int, transform: Any) -> None:
         """An object stands elsewhere: one write, and nothing is pruned again."""
-        made = self._objects[index]
-        made.implicit = dataclasses.replace(made.implicit, transform=transform)
-        self._describe(index)
+        made, row = self._objects[index], self._rows[index]
+        made.placement = placement(transform)
+        row["to_local"] = np.linalg.inv(made.placement)[:3]
+        row["factor"] = np.linalg.svd(made.placement[:3, :3], compute_uv=False)[-1]
+        self._write(self._object_buffer, self._rows[index : index + 1], index * self._rows.itemsize)
 
     def move(self, name: str, matrices: ArrayLike) -> None:
         """The parts of a name are moved from where they stand at rest, in the space that holds them.
@@ -442,83 +584,122 @@ class Field(Closing):
             ParameterError: no such name, parts inside of a twist, bend or repetition without end, another number of
                 transforms, or one that has no inverse or turns a flat part out of its plane.
         """
-        given = np.asarray(matrices, np.float64)
-        sets = self._parts(name)
-        count = sum(parts.count for _, parts in sets)
-        if given.shape not in ((count, 3), (count, 4, 4)):
-            raise ParameterError(f"{name}: shape {given.shape} is neither ({count}, 4, 4) nor ({count}, 3)")
-        if not np.isfinite(given).all():
-            raise ParameterError(f"{name}: a transform is not finite")
-        first = 0
-        for made, parts in sets:
-            self._move(made, parts, given[first : first + parts.count])
-            first += parts.count
+        self.move_all({name: matrices})
+
+    def move_all(self, moves: Mapping[str, ArrayLike]) -> None:
+        """As :meth:`move`, of the parts of several names; for less than one name after another costs."""
+        wanted: dict[_Object, list[tuple[_Parts, Floats]]] = {}
+        for name, matrices in moves.items():
+            given: Floats = np.asarray(matrices)
+            if given.dtype != np.float32 or given.ndim != 2:  # ways are added as they are
+                given = np.asarray(given, np.float64)
+            sets = self._parts(name)
+            count = sum(parts.count for _, parts in sets)
+            if given.shape not in ((count, 3), (count, 4, 4)):
+                raise ParameterError(f"{name}: shape {given.shape} is neither ({count}, 4, 4) nor ({count}, 3)")
+            if not np.isfinite(given).all():
+                raise ParameterError(f"{name}: a transform is not finite")
+            first = 0
+            for made, parts in sets:
+                wanted.setdefault(made, []).append((parts, given[first : first + parts.count]))
+                first += parts.count
+        for made, listed in wanted.items():
+            self._move(made, listed)
 
     def _parts(self, name: str) -> list[tuple[_Object, _Parts]]:
         found = []
         for made in self._objects:
             if name in made.program.names:
-                if name not in made.parts:
-                    if held := next((part.held for part in made.program.names[name] if part.held), ""):
-                        raise ParameterError(f"{name}: it is inside of a {held}, which is made for where it is at rest")
-                    made.parts[name] = _Parts.of(name, made.program.names[name])
-                found.append((made, made.parts[name]))
+                found.append((made, made.parts_of(name)))
         if not found:
             known = sorted({name for made in self._objects for name in made.program.names})
             raise ParameterError(f"no part '{name}'{nearest(name, known)}")
         return found
 
-    def _move(self, made: _Object, parts: _Parts, given: Floats) -> None:
-        moves = given if parts.is_in_order else given[parts.numbers]
-        slots = parts.slots + (made.first_slot + 1)
-        entries = made.first_word + parts.entries
-        if moves.ndim == 2 and parts.is_straight:
-            places = parts.rest + moves
-            self._slots[slots, :3] = places
-            made.placements[parts.leaves, :3, 3] = places
-            if parts.name in made.turned:
-                made.placements[parts.leaves, :3, :3] = np.eye(3)
-                made.turned.discard(parts.name)
-                self._flag(entries, np.zeros(len(entries), bool))
-        else:
-            self._turn(made, parts, _matrices(moves), slots, entries)
-        low, high = int(slots.min()), int(slots.max()) + _LEAF_SLOTS
-        self._write(self._slot_buffer, self._slots[low:high], 16 * low)
-        made.moves[parts.name] = given
+    def _move(self, made: _Object, listed: Sequence[tuple[_Parts, Floats]]) -> None:
+        turned = []
+        for parts, given in listed:
+            moves = given if parts.is_in_order else given[parts.numbers]
+            if moves.ndim == 2 and parts.is_straight:
+                self._shift(made, parts, moves)
+            else:
+                turned.append((parts, _matrices(moves)))
+        if turned:
+            self._turn(made, made.together([parts for parts, _ in turned]), turned)
+        for parts, given in listed:
+            made.moves[parts.name] = given
         made.dirty = made.moved = True
         self._is_remembered = False
 
-    def _turn(
-        self, made: _Object, parts: _Parts, moves: Floats, slots: NDArray[np.intp], entries: NDArray[np.intp]
-    ) -> None:
-        """Write the transforms of parts that are turned, or not leaves."""
+    def _shift(self, made: _Object, parts: _Parts, ways: Floats) -> None:
+        """Write the places of leaves that are only moved."""
+        made.places[:, parts.leaf_at] = places = parts.rest + ways.T
+        rows = parts.first_rows
+        for axis in range(3):  # one by one: numpy takes longer over many short rows
+            rows[:, axis] = places[axis]
+        whole = np.complex128  # a slot as one number
+        self._slots.view(whole)[parts.slots + (made.first_slot + 1), 0] = rows.view(whole)[:, 0]
+        if parts.name in made.turned:
+            made.linear[parts.leaves] = np.eye(3)
+            made.turned.discard(parts.name)
+            self._flag(made.first_word + parts.entries, np.zeros(len(parts.entries), bool))
+        if len(rows) < _MANY:
+            self._send(made, parts)
+            return
+        if (made, parts.name) not in self._lists:
+            numbers = (parts.slots + (made.first_slot + 1)).astype(np.uint32)
+            self._lists[made, parts.name] = (
+                self._buffer("leaf_places", rows, "vec4f"),
+                self._buffer("leaf_slots", numbers, "u32"),
+            )
+        self._write(self._lists[made, parts.name][0], rows)
+        self._listed.add((made, parts.name))
+        self._waiting.add((made, parts.name))
+
+    def _turn(self, made: _Object, parts: _Parts, listed: Sequence[tuple[_Parts, Floats]]) -> None:
+        """Write the transforms of parts that are turned, or not leaves: of the names in ``listed``, all together."""
+        moves = listed[0][1] if len(listed) == 1 else np.concatenate([moves for _, moves in listed])
         placed = parts.before @ moves @ parts.after
-        linear = moves[:, :3, :3].copy()
-        if parts.flat.any():
-            if linear[parts.flat, 2, :2].any() or linear[parts.flat, :2, 2].any():
+        linear, flat = moves[:, :3, :3], parts.flat
+        if flat.any():
+            if _leaves_plane(linear[flat]):
+                name = next(one.name for one, moves in listed if _leaves_plane(moves[one.flat]))
                 raise ParameterError(
-                    f"{parts.name}: it is turned out of the plane that it lies in; name what is extruded or revolved"
+                    f"{name}: it is turned out of the plane that it lies in; name what is extruded or revolved"
                 )
             # Whatever is done across its plane changes nothing in it, and must not be its least stretch.
-            linear[parts.flat, 2, 2] = np.abs(linear[parts.flat, :2, :2]).sum(axis=(1, 2))
+            linear = linear.copy()
+            linear[flat, 2, 2] = np.abs(linear[flat, :2, :2]).sum(axis=(1, 2))
         stretch = _least_stretches(linear)
-        if (stretch < 1e-9).any() or (moves[:, 2, 2][parts.flat] == 0).any():
-            raise ParameterError(f"{parts.name}: a transform that has no inverse")
-        rows = np.linalg.inv(placed)[:, :3].astype(np.float32)
+        if (stretch < 1e-9).any() or (moves[:, 2, 2][flat] == 0).any():
+            name = next(one.name for one, moves in listed if (_least_stretches(moves[:, :3, :3]) < 1e-9).any())
+            raise ParameterError(f"{name}: a transform that has no inverse")
+        rows = np.linalg.inv(placed)[:, :3]
         factors = parts.factors * stretch
-        leaves = parts.leaves >= 0
-        own, scopes = slots[leaves], slots[~leaves]
-        self._slots[own, :3] = placed[leaves, :3, 3]
-        self._slots[own, 3] = factors[leaves]
-        for row in range(3):
-            self._slots[own + 4 + row] = rows[leaves, row]
-            self._slots[scopes + row] = rows[~leaves, row]
-        self._slots[scopes + 3, 0] = factors[~leaves]
-        made.placements[parts.leaves[leaves]] = placed[leaves]
-        turned = (np.abs(placed[leaves, :3, :3] - np.eye(3)) > 1e-12).any(axis=(1, 2))
-        if turned.any() or parts.name in made.turned:
-            made.turned.add(parts.name)
-            self._flag(entries[leaves], turned)
+        for one, _ in listed:  # what is written whole must not be put back where it was
+            self._listed.discard((made, one.name))
+            self._waiting.discard((made, one.name))
+        slots, leaves = self._slots[made.first_slot + 1 :], parts.owned
+        if len(own := parts.own):
+            slots[own, :3] = placed[leaves, :3, 3]
+            slots[own, 3] = factors[leaves]
+            slots[own[:, None] + (4, 5, 6)] = rows[leaves]
+            made.linear[parts.leaves[leaves]] = placed[leaves, :3, :3]
+            made.places[:, parts.leaves[leaves]] = placed[leaves, :3, 3].T
+            turned = (np.abs(placed[leaves, :3, :3] - np.eye(3)) > 1e-12).any(axis=(1, 2))
+            names = {one.name for one, _ in listed}
+            if turned.any() or names & made.turned:
+                made.turned |= names
+                self._flag(made.first_word + parts.entries[leaves], turned)
+        if len(scopes := parts.scopes):
+            slots[scopes[:, None] + (0, 1, 2)] = rows[~leaves]
+            slots[scopes + 3, 0] = factors[~leaves]
+        self._send(made, parts)
+
+    def _send(self, made: _Object, parts: _Parts) -> None:
+        first = made.first_slot + 1
+        for low, high in parts.spans:  # whatever lies between has its newest numbers in them, too
+            self._write(self._slot_buffer, self._slots[first + low : first + high], 16 * (first + low))
 
     def _flag(self, entries: NDArray[np.intp], turned: NDArray[np.bool_]) -> None:
         """Say of leaves whether their places are turned, or only moved."""
@@ -555,15 +736,14 @@ class Field(Closing):
         """The box of all leaves, where nothing but unions is above them."""
         if made.halves is None:
             boxes = np.array([leaf.shape.extent(leaf.sag / factor) for leaf, factor in made.leaves()])
-            made.halves = 0.5 * (boxes[:, 1] - boxes[:, 0])
-            made.middles = 0.5 * (boxes[:, 1] + boxes[:, 0])
-        linear = made.placements[:, :3, :3]
+            made.halves = 0.5 * (boxes[:, 1] - boxes[:, 0]).T
+            made.middles = 0.5 * (boxes[:, 1] + boxes[:, 0]).T
         if made.is_straight and not made.turned:
-            middles, halves = made.middles + made.placements[:, :3, 3], made.halves
+            middles, halves = made.middles + made.places, made.halves
         else:
-            middles = np.einsum("nij,nj->ni", linear, made.middles) + made.placements[:, :3, 3]
-            halves = np.einsum("nij,nj->ni", np.abs(linear), made.halves)
-        return (middles - halves).min(axis=0), (middles + halves).max(axis=0)
+            middles = np.einsum("nij,jn->in", made.linear, made.middles) + made.places
+            halves = np.einsum("nij,jn->in", np.abs(made.linear), made.halves)
+        return (middles - halves).min(axis=1), (middles + halves).max(axis=1)
 
     def edit(self, name: str, **changes: Any) -> None:
         """Change parameters of the primitives of a name: ``edit("ball", radius=0.3)``. A few numbers are written.
@@ -572,30 +752,50 @@ class Field(Closing):
             ParameterError: no such name, a part that is no primitive, or a value that it does not allow.
         """
         for made, parts in self._parts(name):
-            if (parts.leaves < 0).any():
-                raise ParameterError(f"{name}: is more than one primitive, and has no parameters")
-            for index, slot in zip(parts.leaves.tolist(), parts.slots.tolist(), strict=True):
-                leaf = made.program.leaves[index]
-                unknown = [key for key in changes if key not in {f.name for f in dataclasses.fields(leaf.shape)}]
-                if unknown:
-                    raise ParameterError(f"{name}: a {type(leaf.shape).__name__} has no {unknown[0]}")
-                shape: Any = dataclasses.replace(leaf.shape, **changes)
-                if getattr(shape, "payload", None) is not None or shape.lipschitz > leaf.shape.lipschitz * (1 + 1e-9):
-                    raise ParameterError(
-                        f"{name}: a {type(shape).__name__} with samples or a greater bound is a new scene"
-                    )
-                made.program.leaves[index] = dataclasses.replace(leaf, shape=shape)
-                numbers = np.zeros(8, np.float32)
-                numbers[: len(shape.numbers)] = shape.numbers
-                at = made.first_slot + 1 + slot
-                self._slots[at + 1 : at + 3] = numbers.reshape(2, 4)
-                self._slots[at + 3, 1] *= shape.lipschitz / leaf.shape.lipschitz
-                self._write(self._slot_buffer, self._slots[at + 1 : at + 4], 16 * (at + 1))
-            made.halves = None
-            if made.program.sag < 0:  # its box is that of the whole expression
-                edited = made.shape.edited(name, changes)
-                made.implicit, made.has_hull = dataclasses.replace(made.implicit, shape=edited), False
-            made.dirty = made.moved = True
+            self._edit(made, parts, changes)
+
+    def _edit(self, made: _Object, parts: _Parts, changes: Mapping[str, Any]) -> None:
+        name = parts.name
+        if (parts.leaves < 0).any():
+            raise ParameterError(f"{name}: is more than one primitive, and has no parameters")
+        for index, slot in zip(parts.leaves.tolist(), parts.slots.tolist(), strict=True):
+            leaf = made.program.leaves[index]
+            unknown = [key for key in changes if key not in {f.name for f in dataclasses.fields(leaf.shape)}]
+            if unknown:
+                raise ParameterError(f"{name}: a {type(leaf.shape).__name__} has no {unknown[0]}")
+            shape: Any = dataclasses.replace(leaf.shape, **changes)
+            if getattr(shape, "payload", None) is not None or shape.lipschitz > leaf.shape.lipschitz * (1 + 1e-9):
+                raise ParameterError(f"{name}: a {type(shape).__name__} with samples or a greater bound is a new shape")
+            made.program.leaves[index] = dataclasses.replace(leaf, shape=shape)
+            numbers = np.zeros(8, np.float32)
+            numbers[: len(shape.numbers)] = shape.numbers
+            at = made.first_slot + 1 + slot
+            self._slots[at + 1 : at + 3] = numbers.reshape(2, 4)
+            self._slots[at + 3, 1] *= shape.lipschitz / leaf.shape.lipschitz
+            self._write(self._slot_buffer, self._slots[at + 1 : at + 4], 16 * (at + 1))
+        made.halves = None
+        made.edits.setdefault(name, {}).update(changes)
+        if made.program.sag < 0:  # its box is that of the whole expression
+            edited = made.shape.edited(name, changes)
+            made.implicit, made.has_hull = dataclasses.replace(made.implicit, shape=edited), False
+        made.dirty = made.moved = True
+
+    def carry(self, old: Field, kept: Mapping[int, int]) -> None:
+        """What was placed, moved and edited in another field is so in this one as well.
+
+        Args:
+            kept: by numbers of objects here, those of the same objects there. Where the shape is another one, its parts
+                stay at rest.
+        """
+        for index, before in kept.items():
+            made, other = self._objects[index], old._objects[before]
+            self.place(index, other.placement)
+            if made.at_rest is not other.at_rest:
+                continue
+            for name, changes in other.edits.items():
+                self._edit(made, made.parts_of(name), changes)
+            if other.moves:
+                self._move(made, [(made.parts_of(name), given) for name, given in other.moves.items()])
 
     def _jobs(self, index: int) -> list[Any]:
         """The divisions of an object, the coarse one first, each in as many parts as the marks take."""
@@ -632,9 +832,20 @@ class Field(Closing):
         self._is_remembered = self._is_known = False
         for made in self._objects:
             made.dirty = True
+        self._waiting = set(self._listed)
+
+    def _put_in_place(self) -> None:
+        """Record that places which were sent as a list of their own come to their slots."""
+        for which in self._waiting:
+            places, slots = self._lists[which]
+            self._gpu.compute(f"{self._owner}.place", "package::sdf::places", "place").bind(
+                leaf_places=places, leaf_slots=slots, implicit_slots=self._slot_buffer.read_write()
+            ).dispatch_line(slots.size_bytes // 4)
+        self._waiting.clear()
 
     def update(self) -> None:
         """Record the pruning of what has changed, before what asks the field."""
+        self._put_in_place()
         for made in self._objects:
             if made.moved:
                 self._fit(made)
@@ -651,14 +862,18 @@ class Field(Closing):
             jobs[i] = made.jobs
         listed = [job for made in jobs.values() for job in made]
         made_of = [self._objects[i] for i, made in jobs.items() for _ in made]
-        table = np.zeros(len(listed), gpu.dtype(_JOB))
-        for number, job in enumerate(listed):
-            table[number] = job
-        gpu.write(self._job_buffer, table)
+        written = self._jobs_written
+        if [id(made) for made in jobs.values()] != [id(made) for made in written]:
+            table = np.zeros(len(listed), gpu.dtype(_JOB))
+            for number, job in enumerate(listed):
+                table[number] = job
+            gpu.write(self._job_buffer, table)
+            self._jobs_written = list(jobs.values())
         for i in dirty:
-            gpu.encoder.clear_buffer(self._counter_buffer.native, 4 * _COUNTERS * i, 4 * _COUNTERS)
+            gpu.clear_buffer(self._counter_buffer, 4 * _COUNTERS * i, 4 * _COUNTERS)
         scope = {
-            **{name: bound for name, bound in self.bindings.items() if name in ("implicit_objects", "implicit_slots")},
+            "implicit_objects": self.bindings["implicit_objects"],
+            "implicit_slots": self.bindings["implicit_slots"],
             "implicit_lists": self._list_buffer.read_write(),
             "implicit_cells": self._cell_buffer.read_write(),
             "implicit_counters": self._counter_buffer.read_write(),
@@ -670,7 +885,7 @@ class Field(Closing):
         }
         for number, job in enumerate(listed):
             if number:  # one job's marks are read before the next one begins
-                gpu.encoder.clear_buffer(self._counter_buffer.native, 4 * (int(job["counters"]) + 2), 4)
+                gpu.clear_buffer(self._counter_buffer, 4 * (int(job["counters"]) + 2), 4)
             here = {**scope, "implicit_job": gpu.constant(number)}
             if int(job["alive_words"]):
                 gpu.clear_buffer(self._least_buffer)
@@ -720,5 +935,26 @@ class Field(Closing):
         for resource in self.resources():
             resource.destroy()
         self._buffers.clear()
+        self._lists.clear()
+        self._listed.clear()
+        self._waiting.clear()
         self._params = None
         self._gpu.forget_groups()
+
+
+def check_snippets(gpu: Gpu, implicit: Implicit) -> None:
+    """Let the driver check the types of a user's code in an object, its shapes' and its materials'.
+
+    Raises:
+        SnippetError: with the place in the user's file.
+    """
+    found: dict[int, Any] = {id(implicit.material): implicit.material}
+    for node in paint.nodes_of(implicit.shape):
+        if isinstance(node, Painted):
+            found.setdefault(id(node.surface), node.surface)
+        elif getattr(node, "untrusted", False):
+            source: Any = getattr(node, "source", None)
+            validate(gpu, source)
+    for material in found.values():
+        if isinstance(material, ShadedMaterial):
+            validate_shader(gpu, material.shader)

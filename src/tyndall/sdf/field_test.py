@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from tyndall.gpu.device import Gpu, GpuError
 from tyndall.gpu.params import ParameterError
 from tyndall.lab import field_check
-from tyndall.scene.model import Implicit
-from tyndall.sdf import Grid, Shape, box, circle, intersection, rectangle, sphere, subtraction, torus, union
+from tyndall.scene.model import Implicit, translations
+from tyndall.sdf import Grid, Shape, box, circle, cylinder, intersection, rectangle, sphere, subtraction, torus, union
 from tyndall.sdf.field import Field
 from tyndall.sdf.marching import Marching
 from tyndall.sdf.shape import Blend, rotation
@@ -210,6 +210,38 @@ def test_moved_parts_are_where_they_were_moved(
         agree(gpu, field, NAMES.index(name), moved(SHAPES[name], part, given))
 
 
+def test_what_was_smaller_and_is_only_moved_has_its_size_again(gpu: Gpu, field: Field) -> None:
+    """Also where the frame that was to show it failed, and after turns that came before what was sent last."""
+    count, index = 520, NAMES.index("balls")
+    ways, turned = np.random.default_rng(4).normal(0, 0.1, (count, 3)), turns(count, np.random.default_rng(6))
+    field.move("ball", np.diag([0.5, 0.5, 0.5, 1.0])[None].repeat(count, 0))
+    field.move("ball", ways)
+    field.update()
+    gpu.discard()
+    field.forget()
+    agree(gpu, field, index, moved(SHAPES["balls"], "ball", ways), 1000)
+    field.move("ball", 2 * ways)
+    field.move("ball", turned)
+    agree(gpu, field, index, moved(SHAPES["balls"], "ball", turned), 1000)
+    field.move("ball", np.zeros((count, 3)))
+
+
+def test_several_names_move_as_one_after_another(gpu: Gpu) -> None:
+    rng = np.random.default_rng(8)
+    pair = sphere(0.1).named("a").at(0.2) | box(0.2).named("b").at(-0.2)
+    group = union(torus(0.2, 0.05), sphere(0.1).at(0, 0.2), smooth=0.05).named("c").at(0, 0, 0.3)
+    shape = union(pair, group, *(sphere(0.05).at(*rng.uniform(-0.5, 0.5, 3)) for _ in range(6)), smooth=0.05)
+    given = {"a": rng.normal(0, 0.1, (1, 3)), "b": turns(1, rng), "c": turns(1, rng)}
+    there = shape.moved(
+        {name: iter(moves if moves.ndim == 3 else translations(moves)) for name, moves in given.items()}
+    )
+    with Field(gpu, [Implicit(shape)]) as field:
+        field.move_all(given)
+        agree(gpu, field, 0, there, 1000)
+        with pytest.raises(ParameterError, match="c: a transform that has no inverse"):
+            field.move_all({"b": turns(1, rng), "c": np.zeros((1, 4, 4))})
+
+
 @pytest.mark.parametrize("factor", [0.15, 2.0])
 def test_scaled_parts_are_pruned_by_their_new_slopes(gpu: Gpu, factor: float) -> None:
     """Within a part that is made smaller values change faster than where it was compiled, and in parts of it."""
@@ -352,3 +384,21 @@ def test_rays_along_a_surface_end(gpu: Gpu, steps: int) -> None:
     assert dark[sure].all()
     assert not dark[flat].any()
     assert (used <= steps + 160).all()
+
+
+def test_a_field_like_another_has_its_text(gpu: Gpu) -> None:
+    """Of the same kinds in another order, and stacks no deeper; else its own, without what it does not need."""
+    deep = [Implicit(union(sphere(), box(0.4) - torus(0.5, 0.1)))]
+
+    def slot(implicits: list[Implicit], like: Field | None = None) -> object:
+        with Field(gpu, implicits, like=like) as field:
+            return field.bindings["implicit_objects"].slot
+
+    with Field(gpu, deep) as first:
+        text = first.bindings["implicit_objects"].slot
+        flat = union(torus(0.5, 0.1), box(), sphere())
+        assert slot([Implicit(flat)], first) == text != slot([Implicit(flat)])
+        for other in (sphere(), flat | cylinder(), flat - flat - (flat - flat) - ((flat - flat) - (flat - flat))):
+            made = slot([Implicit(other)], first)
+            assert made != text
+        assert slot([Implicit(sphere())], first) == slot([Implicit(sphere())])

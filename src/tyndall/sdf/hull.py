@@ -10,12 +10,14 @@ import math
 from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from tyndall.sdf.repetition import Repetition
 from tyndall.sdf.shape import Box, Combination, Floats, Named, Painted, Shape, Transformed, transformed_box
 
+_STILL = np.eye(4)
 LEAST = 0.5  # of a motion's stretches, for which the boxes are
 _Chain = tuple[tuple[bytes, str, int], ...]  # static transforms, each before a named part's motion
 
@@ -47,20 +49,28 @@ class Hull:
         """The box where the parts are moved by (N, 4, 4) transforms a name; None where one of them makes its part much
         smaller, as what smooth unions add would be more of it.
         """
-        for matrices in moves.values():
-            if np.linalg.svd(matrices[:, :3, :3], compute_uv=False).min() < LEAST:
+        if moves:
+            linear = np.concatenate([matrices[:, :3, :3] for matrices in moves.values()])
+            if np.linalg.svd(linear, compute_uv=False).min() < LEAST:
                 return None
-        lows, highs = [], []
-        for steps, box in self.groups:
-            matrix = np.eye(4)
+        placed = np.empty((len(self.groups), 4, 4))
+        for row, (steps, _) in zip(placed, self.groups, strict=True):
+            matrix = _STILL
             for static, name, number in steps:
-                matrix = matrix @ static
+                matrix = matrix @ static if matrix is not _STILL else static
                 if name in moves:
                     matrix = matrix @ moves[name][number]
-            low, high = transformed_box(box, matrix)
-            lows.append(low)
-            highs.append(high)
-        return np.min(lows, axis=0), np.max(highs, axis=0)
+            row[:] = matrix
+        low, high = transformed_box((self._lows, self._highs), placed)
+        return low.min(axis=0), high.max(axis=0)
+
+    @cached_property
+    def _lows(self) -> Floats:
+        return np.array([low for _, (low, _) in self.groups])[:, None]
+
+    @cached_property
+    def _highs(self) -> Floats:
+        return np.array([high for _, (_, high) in self.groups])[:, None]
 
 
 def _has_names(shape: Shape) -> bool:

@@ -36,7 +36,8 @@ and what it changes is multiplied by s at each further one. That a change be 10�
 more than 7.02 of those k above the whole, however many unions there are (fifteen, with equal shares, are the worst).
 
 Affine transforms are multiplied into the leaves below, except around what changes places by itself and around parts
-with a name, which move as one.
+with a name, which move as one. Of a leaf without a name that is then only enlarged, or round about places that are its
+parameters, parameters take them in: it is not TURNED, and has three rows less to read.
 """
 
 from __future__ import annotations
@@ -81,23 +82,52 @@ _MOST_WIDTHS = 7.02  # of smooth unions, by which a leaf that matters is above t
 class Kinds:
     """The primitives and modifiers of some programs, numbered as their first instructions come.
 
+    Args:
+        like: others, whose numbers it begins with.
+
     Attributes:
         version: grows with every new one: shaders that know fewer must be made anew.
     """
 
-    def __init__(self) -> None:
-        self._primitives: dict[Any, tuple[int, Primitive]] = {}
-        self._modifiers: dict[Any, tuple[int, Modifier]] = {}
-        self.version = 0
+    def __init__(self, like: Kinds | None = None) -> None:
+        self._primitives: dict[Any, tuple[int, Primitive]] = dict(like._primitives) if like else {}
+        self._modifiers: dict[Any, tuple[int, Modifier]] = dict(like._modifiers) if like else {}
+        self._asked: set[Any] = set()
+        self.version: int = like.version if like else 0
 
     def of(self, shape: Primitive | Modifier) -> int:
         """Its number; the same for all whose WESL is the same."""
         known: dict[Any, tuple[int, Any]] = self._primitives if isinstance(shape, Primitive) else self._modifiers
         key = _source(shape)
+        self._asked.add(key)
         if key not in known:
             known[key] = len(known), shape
             self.version += 1
         return known[key][0]
+
+    def ask(self, program: Program) -> None:
+        """Ask for all that a program has, which was compiled with these numbers."""
+        tables: tuple[Any, Any] = self._primitives, self._modifiers
+        for known, codes in zip(tables, program.codes, strict=True):
+            keys: list[Any] = list(known)
+            self._asked |= {keys[code] for code in np.unique(codes).tolist()}
+
+    @property
+    def is_tight(self) -> bool:
+        """Whether it holds none that was never asked for."""
+        return len(self._asked) == len(self._primitives) + len(self._modifiers)
+
+    def tightened(self, programs: Sequence[Program]) -> tuple[Kinds, list[Program]]:
+        """Those that were asked for alone, in the same order, and programs with their numbers."""
+        made, tables = Kinds(), []
+        for known in (self._primitives, self._modifiers):
+            each: dict[Any, tuple[int, Any]] = known
+            table = np.zeros(len(each), np.uint32)
+            for key, (code, shape) in each.items():
+                if key in self._asked:
+                    table[code] = made.of(shape)
+            tables.append(table)
+        return made, [program.renumbered(*tables) for program in programs]
 
     def sources(self) -> list[Any]:
         """The texts among them that a user wrote (:class:`~tyndall.sdf.snippets.SnippetSource`)."""
@@ -246,6 +276,26 @@ class Program:
         """Instructions."""
         return len(self.words)
 
+    @property
+    def codes(self) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]:
+        """Which primitives its leaves are, and which modifiers its scopes."""
+        words = self.words[:, 0]
+        leaves, scopes = self._coded
+        low = np.uint32(0xFFFF)
+        return words[leaves] & low, words[scopes] & low
+
+    @property
+    def _coded(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        kinds, codes = self.words[:, 0] >> 16 & 0xF, self.words[:, 0] & 0xFFFF
+        return kinds == LEAF, ((kinds == ENTER) | (kinds == LEAVE)) & (codes != AFFINE)
+
+    def renumbered(self, primitives: NDArray[np.uint32], modifiers: NDArray[np.uint32]) -> Program:
+        """The same where each primitive and each modifier has another number."""
+        words = self.words.copy()
+        for table, where, codes in zip((primitives, modifiers), self._coded, self.codes, strict=True):
+            words[where, 0] = (words[where, 0] & ~np.uint32(0xFFFF)) | table[codes]
+        return replace(self, words=words)
+
     @cached_property
     def is_short_reaching(self) -> bool:
         """Whether what joins values is hard or polynomial: others reach many times their widths."""
@@ -253,7 +303,10 @@ class Program:
 
     @cached_property
     def spans(self) -> NDArray[np.uint32]:
-        """(n, 2): of what joins two values, where the first one begins, and where the second one does."""
+        """(n, 2): of what joins two values, where the first one begins, and where the second one does.
+
+        Zeros of leaves that join nothing, and ones in all bits of what is neither a leaf nor joins.
+        """
         spans = np.zeros((len(self.words), 2), np.uint32)
         starts: list[int] = []
         entered: list[int] = []
@@ -266,10 +319,12 @@ class Program:
             elif kind == COMBINE:
                 second = starts.pop()
                 spans[i] = starts[-1], second
-            elif kind == ENTER:
-                entered.append(i)
-            elif word & PLACED:
-                starts[-1] = entered.pop()
+            else:
+                spans[i] = 0xFFFFFFFF
+                if kind == ENTER:
+                    entered.append(i)
+                elif word & PLACED:
+                    starts[-1] = entered.pop()
         return spans
 
 
@@ -416,7 +471,9 @@ class _Compiler:
             self._depth -= 1
 
     def _leaf(self, shape: Primitive, c: _Context, join: int, blend: int, k: float) -> None:
-        placement = c.matrix if c.before is None else c.before @ c.matrix
+        placement, factor = c.matrix if c.before is None else c.before @ c.matrix, c.factor
+        if not c.name:
+            shape, placement, factor = _taken_in(shape, placement, factor)
         turned = not np.array_equal(placement[:3, :3], np.eye(3))
         flags = (TURNED if turned else 0) | (BORROWS if c.cuts and c.material is None else 0)
         numbers = [float(x) for x in shape.numbers]
@@ -428,7 +485,7 @@ class _Compiler:
             self._payload_rows.append(len(self._rows) + 1)
         margin = c.margin + min(c.shares, _MOST_WIDTHS * c.widest) if c.margin >= 0 else -1.0
         slot = self._put(
-            (*placement[:3, 3], c.factor),
+            (*placement[:3, 3], factor),
             numbers[:4],
             numbers[4:],
             (k, shape.lipschitz * c.stretch, float(self._material(c.material)), margin),
@@ -494,20 +551,25 @@ class _Compiler:
                 self._emit(child, inside, inner if i else PUSH, HARD, 0.0)
         self._join(join, blend, k, lipschitz)
 
-    def _pairs(self, children: list[tuple[Shape, _Context]], inner: int, kind: int, width: float) -> None:
-        """Smooth joins of neighbours by pairs, as :meth:`Combination.distance` takes them."""
+    def _pairs(
+        self, children: list[tuple[Shape, _Context]], inner: int, kind: int, width: float, above: int = 0
+    ) -> None:
+        """Smooth joins of neighbours by pairs, as :meth:`Combination.distance` takes them; ``above``: joins of the same
+        kind around them.
+        """
         if len(children) == 1:
-            self._emit(*children[0], PUSH, HARD, 0.0)
+            child, c = children[0]
+            self._emit(child, _below_unions(c, kind, width, above), PUSH, HARD, 0.0)
             return
-        if children[0][1].margin >= 0:
-            children = [(child, _below_union(c, kind, width)) for child, c in children]
+        above += 1
         # Pairing from the left gives a first half of a power of two.
         half = 1 << (len(children) - 1).bit_length() - 1
-        self._pairs(children[:half], inner, kind, width)
+        self._pairs(children[:half], inner, kind, width, above)
         if len(children) - half == 1:
-            self._emit(*children[half], inner, kind, width)
+            child, c = children[half]
+            self._emit(child, _below_unions(c, kind, width, above), inner, kind, width)
         else:
-            self._pairs(children[half:], inner, kind, width)
+            self._pairs(children[half:], inner, kind, width, above)
             self._join(inner, kind, width, max(child.lipschitz * c.stretch for child, c in children))
 
     def _scope(
@@ -564,11 +626,27 @@ class _Compiler:
             self._word(LEAVE, code, flags=PLACED if shape.warps else 0, slot=slot)
 
 
-def _below_union(c: _Context, kind: int, width: float) -> _Context:
-    """What is around a part of a smooth union."""
+def _below_unions(c: _Context, kind: int, width: float, count: int) -> _Context:
+    """What is around a part of that many smooth unions, each in the next."""
+    if c.margin < 0 or count == 0:
+        return c
     if kind == EXPONENTIAL:  # is k·log₂(2) below two equal values, and nothing is left of one 24 k above the other
-        return replace(c, margin=c.margin + 25.0 * width, sag=c.sag + width)
-    return replace(c, shares=c.shares + width, widest=max(c.widest, width), sag=c.sag + 0.25 * width)
+        return replace(c, margin=c.margin + 25.0 * count * width, sag=c.sag + count * width)
+    return replace(c, shares=c.shares + count * width, widest=max(c.widest, width), sag=c.sag + 0.25 * count * width)
+
+
+def _taken_in(shape: Primitive, placement: Floats, factor: float) -> tuple[Primitive, Floats, float]:
+    """The leaf, where it is and its factor, once its parameters have taken in how it is turned and enlarged."""
+    linear = placement[:3, :3]
+    if np.array_equal(linear, np.eye(3)):
+        return shape, placement, factor
+    size = float(abs(np.linalg.det(linear))) ** (1 / 3)
+    turn = linear / size
+    if np.abs(turn @ turn.T - np.eye(3)).max() > 1e-9 or (made := shape.similar(turn, size)) is None:
+        return shape, placement, factor
+    moved = np.eye(4)
+    moved[:3, 3] = placement[:3, 3]
+    return made, moved, factor / size
 
 
 def _is_leaf(shape: Shape) -> bool:

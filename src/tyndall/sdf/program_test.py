@@ -224,6 +224,31 @@ def test_kinds_are_numbered_as_they_come() -> None:
     assert [kinds.of(shape) for shape in (sphere(3), box(2), torus())] == [0, 1, 2]
 
 
+def test_kinds_keep_the_numbers_of_others() -> None:
+    """The same set is the same text in whatever order; whether all are in use is known."""
+    first = Kinds()
+    compile_shape(sphere() | box().twist(0.1), first)
+    same = Kinds(first)
+    assert not same.is_tight
+    compile_shape(box() | sphere().twist(0.3), same)
+    assert same.is_tight
+    assert (same.version, same.wesl()) == (first.version, first.wesl())
+    fewer = Kinds(first)
+    program = compile_shape(torus() | (box() & torus()).twist(0.2), fewer)
+    assert not fewer.is_tight
+    tight, (renumbered,) = fewer.tightened([program])
+    assert tight.is_tight
+    assert [tight.of(shape) for shape in (box(), torus())] == [0, 1]
+    alone = Kinds()
+    compile_shape(box(), alone)
+    np.testing.assert_array_equal(renumbered.words, compile_shape(torus() | (box() & torus()).twist(0.2), alone).words)
+    again = Kinds(tight)
+    again.ask(renumbered)
+    assert again.is_tight
+    compile_shape(torus(), same)
+    assert (same.version, first.version) == (4, 3), "the others are as they were"
+
+
 def test_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(ParameterError, match="Circle is flat; extrude or revolve it"):
         compiled(circle())

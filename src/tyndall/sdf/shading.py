@@ -270,15 +270,18 @@ def shines(material: Material) -> bool:
 class Shadings:
     """The shaders of some materials, numbered as they come, with their numbers in one array.
 
+    Args:
+        like: others, whose shaders' numbers it begins with.
+
     Attributes:
         version: grows with every new shader: programs that know fewer must be made anew.
     """
 
-    def __init__(self) -> None:
-        self._shaders: dict[FragmentShader, int] = {}
+    def __init__(self, like: Shadings | None = None) -> None:
+        self._shaders: dict[FragmentShader, int] = dict(like._shaders) if like else {}
         self._places: dict[tuple[float, ...], int] = {}
         self._numbers: list[float] = []
-        self.version = 0
+        self.version: int = like.version if like else 0
 
     def of(self, material: Material) -> tuple[int, int]:
         """(number of its shader or −1, where its numbers begin in :attr:`numbers`)."""

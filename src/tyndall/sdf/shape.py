@@ -402,10 +402,14 @@ class Primitive(Shape):
     Attributes:
         code: the name of that function.
         module: the WESL module that it is in.
+        measured: all its lengths are parameters in metres: it is enlarged by enlarging them.
+        places: which of them are places, of what is round about these: it is turned by turning them; None: it is not.
     """
 
     code: ClassVar[str]
     module: ClassVar[str] = "package::sdf::solids"
+    measured: ClassVar[bool] = False
+    places: ClassVar[tuple[str, ...] | None] = None
 
     @property
     def payload(self) -> NDArray[np.float32] | None:
@@ -420,6 +424,24 @@ class Primitive(Shape):
     def numbers(self) -> tuple[float, ...]:
         """What the WESL function gets, at most 8; the declared parameters in order unless told otherwise."""
         return _numbers(self)
+
+    def similar(self, turn: Floats, size: float) -> Primitive | None:
+        """Itself turned about 0 by an orthogonal 3×3 and enlarged; None where parameters cannot say that."""
+        turns = bool(np.abs(turn - np.eye(3)).max() > 1e-12)
+        if not self.measured or (turns and self.places is None):
+            return None
+        changes: dict[str, Any] = {}
+        for f in fields_of(type(self)):
+            if f.param.unit == "m":
+                value = np.asarray(getattr(self, f.name), np.float64)
+                made = size * (turn @ value if turns and f.name in (self.places or ()) else value)
+                changes[f.name] = tuple(made.tolist()) if made.ndim else float(made)
+        try:
+            whole: Any = self
+            similar: Primitive = replace(whole, **changes)
+            return similar
+        except ParameterError:  # smaller than it may be
+            return None
 
     @property
     def corners(self) -> Box:
@@ -684,13 +706,16 @@ class Transformed(Shape):
 
 
 def transformed_box(box: Box, matrix: Floats) -> Box:
-    """The box of a box under an affine transform; infinite sides stay infinite (Arvo 1990)."""
-    linear = matrix[:3, :3]
+    """The box of a box under an affine transform; infinite sides stay infinite (Arvo 1990).
+
+    (N, 4, 4) transforms of boxes with (N, 1, 3) corners are N boxes.
+    """
+    linear = matrix[..., :3, :3]
     with np.errstate(invalid="ignore"):
         a, b = linear * box[0], linear * box[1]
     a, b = (np.where(linear == 0, 0.0, side) for side in (a, b))  # 0·inf is 0 here
-    low, high = np.minimum(a, b).sum(axis=1), np.maximum(a, b).sum(axis=1)
-    return low + matrix[:3, 3], high + matrix[:3, 3]
+    low, high = np.minimum(a, b).sum(axis=-1), np.maximum(a, b).sum(axis=-1)
+    return low + matrix[..., :3, 3], high + matrix[..., :3, 3]
 
 
 class Marked(Shape):

@@ -11,6 +11,7 @@ which space, :mod:`tyndall.tracing.bvh` how.
 
 from __future__ import annotations
 
+import copy
 import itertools
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -76,7 +77,7 @@ class World(Closing):
         movable: bool = False,
     ) -> None:
         self._gpu = gpu
-        self._own_meshes, self._own_fields = meshes is None, fields is None
+        self._own_meshes, self._own_fields = meshes is None, fields is None and bool(scene.implicits)
         self._meshes = meshes or Meshes(gpu, scene)
         self._fields = fields
         self._buffers: list[Buffer] = []
@@ -119,14 +120,7 @@ class World(Closing):
         self._hanging = self._buffer("hanging", layout.hanging)
         self._box = self._buffer("box", layout.box, f"{_BUILD}::Box")
         self._starts = self._buffer("starts", 4 * (len(layout.hanging) + 1))
-        self.bindings: dict[str, Any] = {
-            "trace_root": self._root.read()
-            .declaring(
-                TRACE_INSTANCED=layout.instanced,
-                TRACE_MASKED=any(m.alpha_mode == "mask" for m in meshes.material_list),
-            )
-            .telling(_FIELDS.format(module="fields" if self._fields else "no_fields")),
-            **(self._fields.bindings if self._fields else {}),
+        self._bound: dict[str, Any] = {
             "trace_nodes": self._nodes.split(),
             "trace_triangles": self._triangles.split(),
             "trace_instances": self._instances.split(),
@@ -137,6 +131,30 @@ class World(Closing):
             "trace_vertices": meshes.attributes.split("vec4u"),
             "trace_materials": meshes.materials.read(),
         }
+        self._bind()
+
+    def _bind(self) -> None:
+        fields = self._fields
+        masked = any(m.alpha_mode == "mask" for m in self._meshes.material_list)
+        root = self._root.read().declaring(TRACE_INSTANCED=self._layout.instanced, TRACE_MASKED=masked)
+        self.bindings: dict[str, Any] = {
+            "trace_root": root.telling(_FIELDS.format(module="fields" if fields else "no_fields")),
+            **(fields.bindings if fields else {}),
+            **self._bound,
+        }
+
+    def see(self, fields: Field | None) -> None:
+        """From now on, rays meet these implicit surfaces, which are another's."""
+        assert not self._own_fields, "its own would be left without an owner"
+        self._fields = fields
+        self._bind()
+
+    def beside(self, fields: Field | None) -> World:
+        """The same triangles with other implicit surfaces; it owns nothing, so it must not outlive this world."""
+        made = copy.copy(self)
+        made._buffers, made._own_meshes, made._own_fields = [], False, False
+        made.see(fields)
+        return made
 
     def _textures(self) -> tuple[Buffer, Buffer]:
         """The materials' textures: where each lies, and the texels of all."""
@@ -174,7 +192,7 @@ class World(Closing):
         if not layout.leaves:
             return
         scope = {
-            **self.bindings,
+            **self._bound,
             "parts": self._parts.read(),
             "part_count": gpu.constant(len(layout.parts)),
             "group_boxes": self._boxes.read(),
@@ -187,7 +205,7 @@ class World(Closing):
         layout.instances["root"] = gpu.read_buffer(self._roots)[layout.instances["group"]]
         gpu.write(self._instances, layout.instances)
         self._scope = {
-            **self.bindings,
+            **self._bound,
             "group_boxes": self._box.read(),
             "hanging": self._hanging.read(),
             "instances": self._instances.read(),

@@ -67,7 +67,7 @@ class FieldShadows(Technique):
 
     def render(self, view: View, content: Sequence[Content]) -> Visibility:
         """March towards each light from what each pixel shows, and draw the meshes' maps."""
-        maps = ShadowMap(size=self.map_size)
+        maps: ShadowMap = view.keep("maps", None, lambda: ShadowMap(size=self.map_size))
         meshes = [kind for kind in content if isinstance(kind, Meshes)] if view.scene.instances else []
         if view.fields is None or not content:
             return maps.render(view.part(maps), content)
@@ -75,8 +75,7 @@ class FieldShadows(Technique):
         if meshes:
             cast = maps.render(view.part(maps), meshes)
         else:
-            empty = ShadowMap(size=16)
-            cast = walked or view.keep("empty", empty, lambda: empty.render(view.part(empty, "empty"), []))
+            cast = walked or view.keep("empty", None, lambda: _no_meshes(view))
         answers = mask_image(view)
         soft = [light.extent > 0 for light in view.scene.lights]
         known = {
@@ -92,3 +91,9 @@ class FieldShadows(Technique):
         if walked:  # those who walk through maps find these, and the few other points of the air ask them as well
             cast = walked
         return Visibility(self.shader(), self.shader(), {**bindings, **cast.bindings}, cast.maps, cast.overlay)
+
+
+def _no_meshes(view: View) -> Visibility:
+    """A map in which nothing is drawn; it stays as it is."""
+    empty = ShadowMap(size=16)
+    return empty.render(view.part(empty, "empty"), [])
