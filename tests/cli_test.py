@@ -81,7 +81,8 @@ def test_techniques_lists_every_parameter_of_every_technique(capsys: pytest.Capt
 def test_techniques_as_json_can_be_given_back_as_flags(capsys: pytest.CaptureFixture[str]) -> None:
     listed = run_json(capsys, "techniques")
     assert {(t["family"], t["name"]) for t in listed} == {
-        (f.name, name) for f in FAMILIES.values() for name in f.members
+        ("marching", "marching"),
+        *((f.name, name) for f in FAMILIES.values() for name in f.members),
     }
     (froxel,) = run_json(capsys, "techniques", "froxel")
     grid = next(p for p in froxel["parameters"] if p["name"] == "grid")
@@ -150,10 +151,26 @@ def test_a_view_is_drawn_in_place_of_the_picture(capsys: pytest.CaptureFixture[s
         (("--view", "step"), "did you mean 'steps'"),
         (("--view", "steps"), "box has none"),
         (("--time", "1"), "nothing moves in box"),
+        (("--time", "nan"), "--time: nan is not a finite number"),
+        (("--time=-inf",), "--time: -inf is not a finite number"),
+        (("--marching.steps", "8"), "--marching.steps: box has no implicit surfaces"),
+        (("--marching.step", "8"), "did you mean 'steps'"),
+        (("--marching.threshold", "9"), "--marching.threshold: 9 is outside 0 … 8"),
     ):
         code, _, err = run(capsys, "render", "box", *words, "--out", "other")
         assert (code, said in err) == (2, True), err
     assert not (folder / "other").exists()
+
+
+@pytest.mark.parametrize("view", [(), ("--view", "depth")])
+def test_how_rays_are_marched_reaches_the_picture(
+    capsys: pytest.CaptureFixture[str], folder: Path, view: tuple[str, ...]
+) -> None:
+    """Rays that go no farther than a centimetre meet nothing."""
+    near = ("--marching.distance", "0.01")
+    drawn = ("render", "swarm:10", "--size", "32x18", "--frames", "1", "--technique", "off", *near, *view)
+    pixels = pixels_of(folder / run_json(capsys, *drawn)["image"])
+    assert np.ptp(pixels, axis=(0, 1)).max() <= 1
 
 
 def test_the_seed_and_the_parameters_reach_the_picture(capsys: pytest.CaptureFixture[str], folder: Path) -> None:

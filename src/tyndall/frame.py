@@ -29,7 +29,6 @@ from tyndall.content.implicit import Fields
 from tyndall.content.mesh import GBUFFER_TARGETS, Meshes
 from tyndall.gpu.device import Gpu, GpuError
 from tyndall.gpu.params import ParameterError, nearest
-from tyndall.gpu.params import replace as changed
 from tyndall.gpu.resources import Closing, Resource, Slot, Texture
 from tyndall.scene.model import (
     Camera,
@@ -186,7 +185,7 @@ class Renderer(Closing):
             self._meshes = Meshes(gpu, self.scene)
         self._content = [self._meshes]
         if self.scene.implicits:
-            marching = self._marching or changed(Marching(), self.scene.looks.get("marching", {}))
+            marching = self._marching or Marching.of(self.scene.looks)
             before = self._beside._fields if self._beside else None
             self._fields = Fields(gpu, self.scene, size, marching, like=before.field if before else None)
             self._content.append(self._fields)
@@ -376,7 +375,8 @@ class Renderer(Closing):
         if self._fields:
             field = self._fields.field
             self._uploaded = field.uploaded - self._sent
-            self._fields.update()
+            self._fields.update(follows=any(view.technique.reads_motion for view in self._views.values()))
+            self._scope |= self._fields.bindings
             self._sent = field.uploaded
         # Its stencil, where it has one, is cleared with it: drivers pack the two, and clear both at once or neither.
         clear = 0 if images["depth"].has_stencil else None
@@ -612,8 +612,10 @@ class Renderer(Closing):
         """
         wanted = self._wanted
         asked = wanted.with_(implicits=implicits, motion=motion or wanted.motion, room=room or wanted.room)
+        drawn = {id(one) for one in wanted.implicits}
         for one in asked.implicits:
-            check_snippets(self.gpu, one)
+            if id(one) not in drawn:
+                check_snippets(self.gpu, one)
         for view in self._views.values():
             view.technique.supports(asked)
         self._asked = asked
@@ -659,7 +661,8 @@ class Renderer(Closing):
                 self._setup(techniques)
                 for frame in range(2):  # the first has no past, so it may have other shaders
                     self._frame, self._history = frame, frame
-                    self._record(camera, jitter=True, casters=True)
+                    with self.gpu.together():
+                        self._record(camera, jitter=True, casters=True)
                     self._discard()
             except BaseException:
                 self.close()

@@ -4,25 +4,37 @@ from __future__ import annotations
 
 import inspect
 from dataclasses import MISSING
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Protocol
 
 from tyndall.gpu.params import Field, ParameterError, describe_range, describe_type, fields_of, nearest
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from tyndall.techniques import Technique
+
+class Listed(Protocol):
+    """What a technique says of itself, and so does the marching of rays, which has parameters as they have."""
+
+    name: ClassVar[str]
+    paper: ClassVar[str]
+    advice: ClassVar[str]
+    receivers: ClassVar[Literal["all", "planes"]]
 
 
-def find_techniques(name: str | None = None) -> list[tuple[str, type[Technique]]]:
-    """(family, technique) of every technique, of one family, or of one technique's name.
+def find_techniques(name: str | None = None) -> list[tuple[str, type[Listed]]]:
+    """(family, technique) of every technique, of one family, or of one technique's name; the marching of rays through
+    implicit surfaces is listed last, a family of its own.
 
     Raises:
         ParameterError: neither a family nor a technique; the nearest right name is offered.
     """
+    from tyndall.sdf.marching import Marching
     from tyndall.techniques import FAMILIES
 
-    every = [(family.name, member) for family in FAMILIES.values() for member in family.members.values()]
+    every: list[tuple[str, type[Listed]]] = [
+        (family.name, member) for family in FAMILIES.values() for member in family.members.values()
+    ]
+    every.append((Marching.name, Marching))
     if name is None:
         return every
     wanted = name.replace("-", "_")
@@ -33,7 +45,7 @@ def find_techniques(name: str | None = None) -> list[tuple[str, type[Technique]]
     return found
 
 
-def technique_json(family: str, technique: type[Technique]) -> dict[str, Any]:
+def technique_json(family: str, technique: type[Listed]) -> dict[str, Any]:
     """Everything that a technique declares, as plain data."""
     return {
         "family": family,
@@ -59,7 +71,7 @@ def technique_json(family: str, technique: type[Technique]) -> dict[str, Any]:
     }
 
 
-def techniques_table(techniques: list[tuple[str, type[Technique]]]) -> RenderableType:
+def techniques_table(techniques: list[tuple[str, type[Listed]]]) -> RenderableType:
     """One paragraph and one table of parameters a technique, under its family's heading."""
     from rich.console import Group
     from rich.markup import escape

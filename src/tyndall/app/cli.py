@@ -10,6 +10,7 @@ from __future__ import annotations
 import errno
 import io
 import json
+import math
 import os
 import shlex
 import sys
@@ -132,6 +133,7 @@ def render(
 ) -> None:
     """Draw one picture: a PNG, and an EXR with linear light and depth; or a PNG of what it is made of."""
     pixels = arguments.parse_size(size)
+    _check_finite("--time", time)
     names = arguments.split_list([technique])
     if len(names) != 1:
         raise ParameterError(f"--technique: '{technique}' is not one technique; compare draws several")
@@ -142,6 +144,7 @@ def render(
     parameters = _parameters(context.obj.flags, "volumetric", [technique], families, model)
     with console.Work("loading") as work:
         described = open_scene(scene, lights)
+        _check_marched(scene, described.implicits, parameters)
         if time is not None:
             if described.motion is None:
                 raise ParameterError(f"--time: nothing moves in {scene}")
@@ -154,7 +157,7 @@ def render(
         check_folder(folder)
         work.advance(0.3, "drawing")
         if view is not None:
-            picture = render_view(described, view, pixels, adapter=adapter)
+            picture = render_view(described, view, pixels, marching=parameters.get("marching"), adapter=adapter)
         else:
             picture = draw(
                 described, size=pixels, parameters=parameters, frames=frames, adapter=adapter, seed=seed, **families
@@ -253,6 +256,7 @@ def compare(
     techniques: dict[str, Any] = {**others, family: chosen}
     with console.Work("loading") as work:
         described = open_scene(scene, lights)
+        _check_marched(scene, described.implicits, parameters)
         folder = out or Path("out", Path(scene.replace(":", "-")).stem)  # not the name in a file, which may be a path
         from tyndall.lab.compare import compare as measure
 
@@ -393,6 +397,7 @@ def sdf(
     """Implicit surfaces against a plain shader loop: time, edits, first picture, and whether pruning is right."""
     from tyndall.lab import bench_sdf as figures
 
+    _check_finite("--seconds", seconds)
     with console.Work("reading", remaining=True) as work:
         result = figures.sdf(adapter, out, quick=quick, seconds=seconds, progress=work.advance)
     if as_json:
@@ -477,6 +482,17 @@ def _truth_settings(context: typer.Context, judge: str) -> tuple[TruthSettings |
     return (replace(default_settings(judge), changes["truth"]) if changes else None), others
 
 
+def _check_finite(flag: str, number: float | None) -> None:
+    if number is not None and not math.isfinite(number):
+        raise ParameterError(f"{flag}: {number} is not a finite number")
+
+
+def _check_marched(scene: str, implicits: Sequence[object], parameters: Overrides) -> None:
+    """Refuse parameters of rays where there is nothing that they march through."""
+    if not implicits and (given := parameters.get("marching")):
+        raise ParameterError(f"--marching.{next(iter(given))}: {scene} has no implicit surfaces")
+
+
 def _parameters(
     flags: Iterable[tuple[str, str, str]],
     family: str,
@@ -489,16 +505,18 @@ def _parameters(
     ``compared`` are the names of a family, ``others`` one of other families each. All names and values are tried out
     here, before a scene is loaded or a device is woken.
     """
+    from tyndall.sdf.marching import Marching
     from tyndall.techniques import FAMILIES
 
-    members = {name: member for family in FAMILIES.values() for name, member in family.members.items()}
+    members: dict[str, type] = {name: cls for family in FAMILIES.values() for name, cls in family.members.items()}
+    members[Marching.name] = Marching
     chosen = [(family, name) for name in compared]
     chosen += [(f, others.get(f, known.default)) for f, known in FAMILIES.items() if f != family]
     for where, name in chosen:
         FAMILIES[where].find(name)
     parameters = arguments.convert_flags(flags, members)
     for name, values in parameters.items():
-        if name not in {used for _, used in chosen}:
+        if name not in {Marching.name, *(used for _, used in chosen)}:
             raise ParameterError(
                 f"--{name}.{next(iter(values))}: '{name}' is not drawn here; choose it with {_flag_of(name)} {name}"
             )

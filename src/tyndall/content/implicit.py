@@ -65,12 +65,13 @@ class Fields:
     ) -> None:
         self._gpu, self._size, self._lights = gpu, size, len(scene.lights)
         self._placed = [np.asarray(one.transform) for one in scene.implicits]
-        self._moves = False
+        self._moves = self._parts_move = False
         self._before: dict[int, NDArray[np.float64]] = {}
         self._motion: Buffer | None = None
+        self._flow: Texture | None = None
         self._starts: Buffer | None = None
         self._images: dict[str, Texture] = {}
-        self._maps: dict[int, Texture] = {}
+        self._maps: dict[tuple[int, int], Texture] = {}
         self._shade: Texture | None = None
         self.emits = any(shines(material) for one in scene.implicits for material in materials_of(one))
         self.parts = {
@@ -83,6 +84,7 @@ class Fields:
             if len(scene.implicits) <= _MOST_TILED:
                 starts = 4 * math.prod(-(-side // _TILE) for side in size) * len(scene.implicits)
                 self._starts = gpu.buffer("field.starts", starts, owner=OWNER, element="f32")
+            self._flow = gpu.texture("field.flow", (1, 1), "rgba16float", owner=OWNER)
             self._motion = gpu.buffer("field.motion", self._still(), owner=OWNER, element=f"{MODULE}::Motion")
         except BaseException:
             self.close()
@@ -96,11 +98,12 @@ class Fields:
     @property
     def bindings(self) -> dict[str, Bound]:
         """What the last march found: ``field_depth`` (reversed-Z, 0: nothing) and ``field_ids`` (see
-        ``implicit.wesl``); and ``field_motion``.
+        ``implicit.wesl``); and ``field_motion`` and ``field_flow``.
         """
         assert self._motion is not None
+        assert self._flow is not None
         images = {f"field_{name}": image.sampled() for name, image in self._images.items()}
-        return {**images, "field_motion": self._motion.read()}
+        return {**images, "field_motion": self._motion.read(), "field_flow": self._flow.sampled()}
 
     # --- motion ---------------------------------------------------------------------------------------------------
 
@@ -120,17 +123,28 @@ class Fields:
             self._placed[index] = old._placed[before]
         self.field.carry(old.field, kept)
 
-    def update(self) -> None:
-        """Bring the device up to date, at the beginning of a frame."""
+    def update(self, *, follows: bool) -> None:
+        """Bring the device up to date, at the beginning of a frame.
+
+        Args:
+            follows: the way of parts that move by themselves is asked for, beyond that of their objects;
+                :attr:`bindings` may be others then.
+        """
+        moved = self.field.moved_parts() & (follows and self.field.remembers)
         self.field.update()
-        if self._before or self._moves:
+        self._follows, self._parts_move = follows, bool(moved.any())
+        if self._parts_move and self._flow is not None and self._flow.size[:2] != self._size:
+            self._flow.destroy()
+            self._flow = self._gpu.texture("field.flow", self._size, "rgba16float", owner=OWNER)
+        if self._before or self._moves or self._parts_move:
             assert self._motion is not None
             rows = self._still()
+            rows["parts"] = moved
             for index, before in self._before.items():
                 matrix = before @ np.linalg.inv(self._placed[index])
                 rows[index]["x"], rows[index]["y"], rows[index]["z"] = matrix[:3]
             self._gpu.write(self._motion, rows)
-        self._moves = bool(self._before)
+        self._moves = bool(self._before) or self._parts_move
         self._before.clear()
 
     def _still(self) -> NDArray[Any]:
@@ -165,6 +179,13 @@ class Fields:
         gpu.compute("gbuffer.field_resolve", MODULE, "resolve").bind(bound, **self.bindings).features(
             scene_emits=emissive, alone=alone
         ).dispatch(*self._size)
+        if self._parts_move:
+            assert self._flow is not None
+            gpu.compute("gbuffer.field_flow", MODULE, "flow").bind(
+                bound, **self.bindings, **self.field.before, field_flow_out=self._flow.write()
+            ).dispatch(*self._size)
+        if self._follows:
+            self.field.remember()
         if depth is None:
             return
         stencil = 0 if alone and depth.has_stencil else None
@@ -216,10 +237,9 @@ class Fields:
 
     def _map(self, size: tuple[int, int]) -> Texture:
         """The image of depths for maps of a size, which all maps share one after another."""
-        side = size[0]
-        if side not in self._maps:
-            self._maps[side] = self._gpu.texture("field.map", size, "r32float", owner=OWNER)
-        return self._maps[side]
+        if size not in self._maps:
+            self._maps[size] = self._gpu.texture("field.map", size, "r32float", owner=OWNER)
+        return self._maps[size]
 
     def _shaded(self, size: tuple[int, int]) -> Texture:
         """A bit a light and pixel."""
@@ -254,7 +274,7 @@ class Fields:
     def resources(self) -> list[Resource]:
         """What is held on the device."""
         shade = [self._shade] if self._shade else []
-        own = [buffer for buffer in (self._motion, self._starts) if buffer]
+        own = [one for one in (self._motion, self._starts, self._flow) if one]
         return [*self.field.resources(), *own, *self._images.values(), *self._maps.values(), *shade]
 
     def forget_bundles(self) -> None:
@@ -270,10 +290,10 @@ class Fields:
         for image in self._images.values():
             image.destroy()
         self._images.clear()
-        for buffer in (self._motion, self._starts):
-            if buffer:
-                buffer.destroy()
-        self._motion = self._starts = None
+        for one in (self._motion, self._starts, self._flow):
+            if one:
+                one.destroy()
+        self._motion = self._starts = self._flow = None
         self.field.close()
 
 

@@ -562,10 +562,11 @@ class Gpu(Closing):
 
     def _timer(self, label: str) -> int | None:
         """The first of the two queries of a pass of this name."""
-        if not self._timed or not self._recording.timed or len(self._labels) >= _MAX_TIMED_PASSES:
+        recording = self._recording
+        if not self._timed or not recording.timed or len(recording.labels) >= _MAX_TIMED_PASSES:
             return None
-        self._labels.append(label)
-        return 2 * len(self._labels) - 2
+        recording.labels.append(label)
+        return 2 * len(recording.labels) - 2
 
     def _begin_compute(self, label: str) -> Any:
         """A new pass."""

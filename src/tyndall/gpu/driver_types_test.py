@@ -21,7 +21,7 @@ typedef uint64_t Flags;
 _NAMES = ("Inner", "Outer", "Hidden", "ConstInner", "Kind", "Told", "Flags", "char", "uint8_t", "uint32_t", "intptr_t")
 
 
-@pytest.mark.parametrize("suffix", ["", " *", "[]", " []", " * "])
+@pytest.mark.parametrize("suffix", ["", " *", "[]", " []", " * ", " const *"])
 def test_types_are_the_same(suffix: str) -> None:
     parsed, looked_up = FFI(), FFI()
     for each in (parsed, looked_up):
@@ -34,6 +34,19 @@ def test_types_are_the_same(suffix: str) -> None:
         assert slow.kind == quick.kind
         if not suffix.strip().startswith("["):
             assert parsed.sizeof(text) == looked_up.sizeof(text)
+
+
+def test_callbacks_are_the_same() -> None:
+    parsed, looked_up = FFI(), FFI()
+    for each in (parsed, looked_up):
+        each.cdef(_HEADER)
+    assert look_up(looked_up)
+    told: list[int] = []
+    for text in ("void(Hidden const *, Kind, Inner, void *, void *)", "void(Hidden, Kind, void *)", "void(void)"):
+        slow, quick = parsed.callback(text, told.append), looked_up.callback(text, told.append)
+        assert str(parsed.typeof(slow)) == str(looked_up.typeof(quick))
+        assert [str(t) for t in parsed.typeof(slow).args] == [str(t) for t in looked_up.typeof(quick).args]
+    assert looked_up.typeof(looked_up.callback("void(Hidden, Kind, void *)", print)) is looked_up.typeof("Told")
 
 
 def test_what_is_not_plain_is_parsed() -> None:

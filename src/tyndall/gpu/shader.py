@@ -31,6 +31,7 @@ _VIRTUAL_IMPORT = re.compile(
     r"import\s+(package::(?:bindings|visibility|surface_visibility|occlusion))::(\{[^}]*\}|\w+)\s*;"
 )
 _ATTRIBUTE = re.compile(r"@\w+(?:\([^)]*\))?\s*")
+_SWITCH = re.compile(r"^const (\w+) = (true|false);$", re.MULTILINE)
 _WORKGROUP = re.compile(r"@workgroup_size\s*\(((?:\s*\d+[iu]?\s*,?)+)\)")
 _DECLARATION = re.compile(r"(?:fn|struct|const|override|var(?:<[^>]*>)?)\s+(\w+)")
 # Line numbers of the driver's report. A fault of grammar has its place in the heading, "┌─ wgsl:4:5"; a fault of
@@ -121,7 +122,8 @@ class Linker:
         Args:
             module: root module, ``package::…``.
             entries: names of the entry points to keep.
-            bindings: text of ``package::bindings``.
+            bindings: text of ``package::bindings``. Its ``const NAME = true;`` are switches as well, so that a shader
+                may leave out what it will not reach: the driver translates all that is there.
             overlay: virtual module name → real module name.
             features: switches for ``@if``.
 
@@ -133,7 +135,8 @@ class Linker:
         for alias, real in overlay.items():
             modules[alias], names[alias] = self.modules[real], self.filenames[real]
         try:
-            result = wesl.compile(modules, root=module, keep=list(entries), filenames=names, features=dict(features))
+            switches = {name: value == "true" for name, value in _SWITCH.findall(bindings)} | dict(features)
+            result = wesl.compile(modules, root=module, keep=list(entries), filenames=names, features=switches)
         except wesl.CompileError as error:
             raise ShaderError(_describe(error, names.get(module, module))) from None
         used = frozenset(int(n) for n in _USED.findall(result.wgsl))

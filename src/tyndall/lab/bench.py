@@ -32,7 +32,8 @@ import numpy as np
 
 from tyndall.gpu.device import Gpu, GpuError, choose_adapter
 from tyndall.lab import bench_tables
-from tyndall.lab.picture import check_folder, write_texts
+from tyndall.lab.figures import Figures, check_times, text_of
+from tyndall.lab.picture import check_folder
 from tyndall.lab.stage import Overrides
 from tyndall.lab.sweep import sweep
 from tyndall.lab.sweep_spec import Plan, plan
@@ -107,20 +108,10 @@ QUICK = Settings(
 )
 
 
-@dataclass(frozen=True)
-class Bench:
-    """The figures of one run, as plain data (:meth:`to_json`), tables (:meth:`markdown`) and plots (:meth:`plots`).
+class Bench(Figures):
+    """The figures of one run, and plots of them (:meth:`plots`)."""
 
-    Attributes:
-        notes: what a reader should know of how they came about, a line each.
-    """
-
-    document: Mapping[str, Any]
-    notes: tuple[str, ...] = ()
-
-    def to_json(self) -> dict[str, Any]:
-        """Ready for ``json.dumps``."""
-        return dict(self.document)
+    name = NAME
 
     def markdown(self, images: str | None = None) -> str:
         """All tables, as they stand in ``docs/benchmarks.md``; with ``images``, links to plots whose names begin so."""
@@ -130,21 +121,10 @@ class Bench:
         """S1's figures 20 to 22 from these figures: SVG files by name."""
         return bench_tables.plots(self.document)
 
-    def __str__(self) -> str:
-        return self.markdown()
-
-    def save(self, folder: str | os.PathLike[str]) -> Path:
-        """Write ``volumetric.json``, ``volumetric.md`` and its plots.
-
-        Raises:
-            OutputError: ``folder`` is a file, or the system refuses.
-        """
-        target = Path(folder)
-        files = {f"{NAME}.json": json.dumps(self.document, indent=1, ensure_ascii=False) + "\n"}
-        files |= {f"{NAME}-{name}.svg": text for name, text in self.plots().items()}
-        files[f"{NAME}.md"] = self.markdown(f"{NAME}-")
-        write_texts(target, files)
-        return target
+    def files(self) -> dict[str, str]:
+        """The plots too, before the tables that link to them."""
+        plots = {f"{NAME}-{name}.svg": text for name, text in self.plots().items()}
+        return {f"{NAME}.json": text_of(self.document), **plots, f"{NAME}.md": self.markdown(f"{NAME}-")}
 
 
 def volumetric(
@@ -174,8 +154,7 @@ def volumetric(
     if out is not None:
         check_folder(Path(out))
     features = adapter.features if isinstance(adapter, Gpu) else choose_adapter(adapter).features
-    if "timestamp-query" not in features:
-        raise GpuError("this adapter cannot time what it draws (timestamp-query), and a benchmark is of times")
+    check_times(features)
     if progress:
         progress(0.0, "reading the scenes")
     planned = plan(spec(chosen))

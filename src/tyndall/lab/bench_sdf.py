@@ -25,7 +25,6 @@ after each figure. ``quick`` measures the same things in small.
 from __future__ import annotations
 
 import dataclasses
-import json
 import os
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -40,12 +39,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tyndall.frame import Renderer
-from tyndall.gpu.device import Gpu, GpuError
+from tyndall.gpu.device import Gpu
 from tyndall.gpu.params import ParameterError, nearest
 from tyndall.lab import bench_sdf_tables as tables
 from tyndall.lab import s5
 from tyndall.lab.busy import Busy
 from tyndall.lab.field_check import agreement
+from tyndall.lab.figures import Figures, text_of, timed_device
 from tyndall.lab.fingerprint import scene_hash, versions
 from tyndall.lab.first_picture import Order, in_a_process, run, techniques_of
 from tyndall.lab.measure import Times, measure
@@ -121,33 +121,14 @@ QUICK = Settings(
 )
 
 
-@dataclass(frozen=True)
-class SdfBench:
-    """The figures of one run, as plain data (:meth:`to_json`) and as tables (:meth:`markdown`)."""
+class SdfBench(Figures):
+    """The figures of one run."""
 
-    document: Mapping[str, Any]
-
-    def to_json(self) -> dict[str, Any]:
-        """Ready for ``json.dumps``."""
-        return dict(self.document)
+    name = NAME
 
     def markdown(self) -> str:
         """All tables, as they stand in ``docs/benchmarks.md``."""
         return tables.markdown(self.document)
-
-    def __str__(self) -> str:
-        return self.markdown()
-
-    def save(self, folder: str | os.PathLike[str]) -> Path:
-        """Write ``sdf.json`` and ``sdf.md``.
-
-        Raises:
-            OutputError: ``folder`` is a file, or the system refuses.
-        """
-        target = Path(folder)
-        text = json.dumps(self.document, indent=1, ensure_ascii=False) + "\n"
-        write_texts(target, {f"{NAME}.json": text, f"{NAME}.md": self.markdown()})
-        return target
 
 
 def sdf(
@@ -182,16 +163,9 @@ def sdf(
             raise ParameterError(f"parts: no part '{part}'{nearest(part, PARTS)} (there are {', '.join(PARTS)})")
     if out is not None:
         check_folder(Path(out))
-    own = not isinstance(adapter, Gpu)
-    gpu = adapter if isinstance(adapter, Gpu) else Gpu(adapter)
-    try:
-        if "timestamp-query" not in gpu.features:
-            raise GpuError("this adapter cannot time what it draws (timestamp-query), and a benchmark is of times")
+    with timed_device(adapter) as gpu:
         work = _Run(gpu, chosen, Path(out) if out is not None else None, progress)
         work.all()
-    finally:
-        if own:
-            gpu.close()
     bench = SdfBench(work.document)
     if out is not None:
         bench.save(out)
@@ -543,8 +517,7 @@ class _Run:
 
     def _save(self) -> None:
         if self._out is not None:
-            text = json.dumps(self.document, indent=1, ensure_ascii=False) + "\n"
-            write_texts(self._out, {f"{NAME}.json": text})
+            write_texts(self._out, {f"{NAME}.json": text_of(self.document)})
 
 
 def _told(name: str) -> str:

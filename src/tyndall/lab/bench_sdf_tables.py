@@ -422,7 +422,8 @@ def _first(document: Document) -> str:
                 rows.append([f"`{row['scene']}`", nodes, name, *cells])
     text = (
         "From a scene and a device until a picture is there, the compiling of all pipelines in it; and the same again "
-        "on the same device. A process also imports, makes its device and models the scene."
+        "on the same device. Pipelines are built side by side, in as many threads as there are processors, while the "
+        "first frame is recorded. A process also imports, makes its device and models the scene."
     )
     return f"### First picture\n\n{text}\n\n{_table(heading, rows)}"
 

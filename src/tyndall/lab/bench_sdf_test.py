@@ -88,6 +88,9 @@ def test_everything_is_measured(gpu: Gpu, small: object, tmp_path: Path) -> None
     assert set(rows) == {"nothing", "a leaf", "the object", "all leaves", "the scene's own motion"}
     assert rows["a leaf"]["uploaded"] > rows["nothing"]["uploaded"]
     assert document["first"][0]["running"]["warm_ms"] > 0
+    parts = document["first"][0]["running"]
+    assert parts["setup_ms"] + parts["record_ms"] <= parts["first_ms"] + 0.01
+    assert parts["link_ms"] + parts["modules_ms"] + parts["pipelines_ms"] >= max(parts["slowest"].values(), default=0)
     agreed = document["agreement"][0]
     assert agreed["still"]["points"] == 500
     assert max(agreed["still"]["difference"], agreed["moved"]["difference"]) < 1e-4

@@ -50,9 +50,10 @@ from tyndall.lab.bench import line
 from tyndall.lab.busy import Busy
 from tyndall.lab.compare import SOFT_FRAMES
 from tyndall.lab.complexity import lines_of
+from tyndall.lab.figures import Figures, timed_device
 from tyndall.lab.fingerprint import scene_hash, versions
 from tyndall.lab.measure import Measurement, belongs, measure, wall_clock
-from tyndall.lab.picture import check_folder, write_texts
+from tyndall.lab.picture import check_folder
 from tyndall.lab.shadow_situations import SITUATIONS
 from tyndall.lab.stage import Stage, adapter_name, describe, driver_name
 from tyndall.lab.standard import Standard
@@ -136,38 +137,14 @@ QUICK = Settings(
 )
 
 
-@dataclass(frozen=True)
-class ShadowBench:
-    """The figures of one run, as plain data (:meth:`to_json`) and as tables (:meth:`markdown`).
+class ShadowBench(Figures):
+    """The figures of one run."""
 
-    Attributes:
-        notes: what a reader should know of how they came about, a line each.
-    """
-
-    document: Mapping[str, Any]
-    notes: tuple[str, ...] = ()
-
-    def to_json(self) -> dict[str, Any]:
-        """Ready for ``json.dumps``."""
-        return dict(self.document)
+    name = NAME
 
     def markdown(self) -> str:
         """All tables, as they stand in ``docs/benchmarks.md``."""
         return tables.markdown(self.document)
-
-    def __str__(self) -> str:
-        return self.markdown()
-
-    def save(self, folder: str | os.PathLike[str]) -> Path:
-        """Write ``shadows.json`` and ``shadows.md``.
-
-        Raises:
-            OutputError: ``folder`` is a file, or the system refuses.
-        """
-        target = Path(folder)
-        text = json.dumps(self.document, indent=1, ensure_ascii=False) + "\n"
-        write_texts(target, {f"{NAME}.json": text, f"{NAME}.md": self.markdown()})
-        return target
 
 
 def shadows(
@@ -201,17 +178,9 @@ def shadows(
     labels = choose(chosen.techniques)
     if out is not None:
         check_folder(Path(out))
-    own = not isinstance(adapter, Gpu)
-    gpu = adapter if isinstance(adapter, Gpu) else Gpu(adapter)
-    try:
-        if "timestamp-query" not in gpu.features:
-            raise GpuError("this adapter cannot time what it draws (timestamp-query), and a benchmark is of times")
-        with _Desk(gpu) as desk:
-            run = _Run(gpu, desk, chosen, labels, _Kept(Path(out) if out is not None else None, fresh), progress)
-            document = run.document()
-    finally:
-        if own:
-            gpu.close()
+    with timed_device(adapter) as gpu, _Desk(gpu) as desk:
+        run = _Run(gpu, desk, chosen, labels, _Kept(Path(out) if out is not None else None, fresh), progress)
+        document = run.document()
     reused = run.kept.reused
     notes = (f"{reused} of {reused + run.kept.made} figures were measured before",) if reused else ()
     bench = ShadowBench(document, notes)

@@ -37,10 +37,11 @@ from tyndall.lab.judging import Judges, cores
 from tyndall.lab.measure import Measurement, measure
 from tyndall.lab.metrics import Scores
 from tyndall.lab.picture import Picture, check_folder
-from tyndall.lab.stage import Overrides, Stage, Still, describe, make
+from tyndall.lab.stage import Overrides, Stage, Still, describe, make, values
 from tyndall.lab.standard import KINDS, Standard
 from tyndall.lab.truth import Truth, TruthSettings
 from tyndall.scene.model import Medium, Scene
+from tyndall.sdf.marching import Marching
 from tyndall.techniques import FAMILIES
 from tyndall.techniques.contract import Technique, Unsupported
 
@@ -89,7 +90,8 @@ def compare(
             the air would be its time, and not the shadow technique's.
         occlusion, reflection, volume, antialiasing, tonemap: by name or ready made; None is the family's default.
         model: "physical", "paper" or "both", for volumetric techniques that have models; None leaves each as it is.
-        parameters: by technique name, parameters to change: ``{"froxel": {"grid": (190, 90, 128)}}``.
+        parameters: by technique name, parameters to change: ``{"froxel": {"grid": (190, 90, 128)}}``; by "marching",
+            when rays through implicit surfaces end.
         truth: what errors are against: "traced", "march", "mitsuba", a truth that is there already, or None for no
             errors.
         truth_settings: when a traced truth is good enough; None is
@@ -169,6 +171,7 @@ def compare(
             driver=stage.driver,
             parameters={
                 **{name: describe(stage.techniques[name]) for name in others},
+                **({Marching.name: values(stage.marching)} if scene.implicits else {}),
                 "frames": max((r.measurement.frames for r in results), default=0),
                 "seed": seed,
             },

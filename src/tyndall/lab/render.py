@@ -32,7 +32,8 @@ def render(
         size: width and height in pixels.
         volumetric, shadow, occlusion, reflection, volume, antialiasing, tonemap: a technique of each family, by name or
             ready made; None is the family's default. One made by name starts from the scene's looks.
-        parameters: by technique name, parameters to change: ``{"froxel": {"grid": (190, 90, 128)}}``.
+        parameters: by technique name, parameters to change: ``{"froxel": {"grid": (190, 90, 128)}}``; by "marching",
+            when rays through implicit surfaces end.
         frames: how many frames are drawn; temporal antialiasing gathers its samples from them.
         adapter: part of an adapter's name, or a device to share.
         seed: of everything random.

@@ -21,6 +21,7 @@ from tyndall.gpu.params import ParameterError, fields_of, nearest
 from tyndall.gpu.resources import Closing
 from tyndall.lab.picture import Picture
 from tyndall.scene.model import Scene
+from tyndall.sdf.marching import Marching
 from tyndall.techniques import FAMILIES
 from tyndall.techniques.antialiasing import NoAntialiasing
 from tyndall.techniques.contract import Technique
@@ -71,8 +72,12 @@ def family_of(technique: Technique) -> str:
 
 def describe(technique: Technique) -> dict[str, Any]:
     """Name and parameters of a technique, as plain data."""
-    values = {f.name: getattr(technique, f.name) for f in fields_of(type(technique))}
-    return {"technique": technique.name, **values}
+    return {"technique": technique.name, **values(technique)}
+
+
+def values(declared: Any) -> dict[str, Any]:
+    """Every parameter by name, of anything that declares some."""
+    return {f.name: getattr(declared, f.name) for f in fields_of(type(declared))}
 
 
 def adapter_name(gpu: Gpu) -> str:
@@ -93,6 +98,8 @@ class Stage(Closing):
         adapter: part of an adapter's name, or a device to share; a shared one is left open.
         volumetric, shadow, occlusion, reflection, volume, antialiasing, tonemap: techniques by name, ready made, or
             None for the family's default; ``techniques`` has them by family.
+        parameters: by technique name, parameters to change; those of "marching" are when rays through implicit surfaces
+            end.
 
     Raises:
         GpuError: no such adapter, or a size beyond its limits.
@@ -115,7 +122,7 @@ class Stage(Closing):
         adapter: str | Gpu | None = None,
         seed: int = 0,
     ) -> None:
-        known = [name for family in FAMILIES.values() for name in family.members]
+        known = [Marching.name, *(name for family in FAMILIES.values() for name in family.members)]
         for name in parameters or {}:
             if name not in known:
                 raise ParameterError(f"parameters: no technique '{name}'{nearest(name, known)}")
@@ -130,6 +137,7 @@ class Stage(Closing):
             "tonemap": tonemap,
         }
         self.techniques = {family: make(family, name, scene, parameters) for family, name in chosen.items()}
+        self.marching = Marching.of(scene.looks, (parameters or {}).get(Marching.name))
         self._owned = not isinstance(adapter, Gpu)
         self.gpu = adapter if isinstance(adapter, Gpu) else Gpu(adapter)
         try:
@@ -137,7 +145,9 @@ class Stage(Closing):
             others: dict[str, Any] = {
                 family: made for family, made in self.techniques.items() if family != "volumetric"
             }
-            self._renderer = Renderer(scene, size, gpu=self.gpu, seed=seed, volumetric="off", **others)
+            self._renderer = Renderer(
+                scene, size, gpu=self.gpu, seed=seed, marching=self.marching, volumetric="off", **others
+            )
         except BaseException:
             if self._owned:
                 self.gpu.close()
@@ -193,7 +203,8 @@ class Stage(Closing):
     def resized(self, size: tuple[int, int]) -> Stage:
         """Another stage that differs in its size only, on the same device."""
         same: dict[str, Any] = dict(self.techniques)
-        return Stage(self.scene, size, adapter=self.gpu, seed=self.seed, **same)
+        marched = {Marching.name: values(self.marching)}
+        return Stage(self.scene, size, parameters=marched, adapter=self.gpu, seed=self.seed, **same)
 
     def unlit(self) -> Still:
         """The same view with all lights off: what shines by itself, and ambient light."""

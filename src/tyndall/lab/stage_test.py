@@ -7,6 +7,8 @@ import numpy as np
 from tyndall.gpu.device import Gpu
 from tyndall.lab.stage import Stage, describe, make
 from tyndall.scene.bundled.box import box
+from tyndall.scene.model import Implicit, Scene
+from tyndall.sdf import sphere
 
 
 def test_a_still_frame_does_not_remember(gpu: Gpu) -> None:
@@ -91,3 +93,13 @@ def test_with_the_lights_off_what_is_ambient_stays(gpu: Gpu) -> None:
     np.testing.assert_array_equal(unlit.surfaces, expected.surfaces)
     assert unlit.surfaces.mean() > 0, "the scene has ambient light"
     assert lit.surfaces.mean() > 1.05 * unlit.surfaces.mean(), "the lights are on again"
+
+
+def test_how_rays_are_marched_is_the_scenes_then_what_is_asked_for(gpu: Gpu) -> None:
+    scene = Scene(implicits=[Implicit(sphere(1))], looks={"marching": {"steps": 7, "threshold": 1}})
+    with (
+        Stage(scene, (8, 8), parameters={"marching": {"steps": "9"}}, adapter=gpu) as stage,
+        stage.resized((4, 4)) as other,
+    ):
+        assert (stage.marching.steps, stage.marching.threshold) == (9, 1)
+        assert other.marching == stage.marching

@@ -37,6 +37,7 @@ from tyndall.lab.stage import Stage, Still
 from tyndall.lab.sweep_spec import OTHERS
 from tyndall.lab.truth import Truth, TruthSettings
 from tyndall.scene.model import Scene
+from tyndall.sdf.marching import Marching
 from tyndall.techniques import FAMILIES
 from tyndall.techniques.contract import Technique
 
@@ -120,14 +121,16 @@ class Station(Closing):
         return self._scene[1]
 
     def _prepare(self, scene: Scene, point: Mapping[str, Any]) -> Stage:
-        key = [point[name] for name in ("size", *OTHERS, "seed")]  # of this scene: another scene forgets it
+        marching = point.get(Marching.name)
+        key = [marching, *(point[name] for name in ("size", *OTHERS, "seed"))]  # another scene forgets it
         if self._stage is None or self._stage[0] != key:
             if self._stage is not None:
                 self._stage[1].close()
             self._stage = self._judged = None
             others: dict[str, Any] = {family: technique_of(family, point[family]) for family in OTHERS}
             width, height = point["size"]
-            stage = Stage(scene, (width, height), adapter=self.gpu, seed=point["seed"], **others)
+            parameters = {Marching.name: marching} if marching else {}
+            stage = Stage(scene, (width, height), parameters=parameters, adapter=self.gpu, seed=point["seed"], **others)
             self._stage = key, stage
         return self._stage[1]
 

@@ -7,9 +7,9 @@ A specification is a JSON object (``docs/sweeps.md``), or the same as Python dat
      "truth": {"judge": "traced", "target": 0.01}}
 
 Wherever one value may stand, a list of values may, and the sweep is their product: scene × lights × size × shadow ×
-antialiasing × tonemap × technique × its parameters, the last of these changing fastest. ``parts`` holds further
-objects of the same fields; each is a product of its own that starts from the fields around it, and the sweep is all of
-them, one after another. A point that is asked for twice is measured once.
+antialiasing × tonemap × ``marching`` of rays × technique × its parameters, the last of these changing fastest.
+``parts`` holds further objects of the same fields; each is a product of its own that starts from the fields around it,
+and the sweep is all of them, one after another. A point that is asked for twice is measured once.
 
 Nothing is drawn before the whole is right: every name, value, parameter, scene file and number of lights is tried out,
 and :class:`SweepError` has one line for each mistake, with its place.
@@ -42,6 +42,7 @@ from tyndall.lab.truth import TruthSettings
 from tyndall.scene.errors import SceneError
 from tyndall.scene.files.schema import path_text
 from tyndall.scene.model import Scene
+from tyndall.sdf.marching import Marching
 from tyndall.techniques import FAMILIES
 from tyndall.techniques.contract import Technique, Unsupported
 
@@ -49,7 +50,8 @@ Plain = dict[str, Any]
 Location = tuple[str | int, ...]
 
 _SIZE = re.compile(r"([+-]?\d{1,9})\s*[x×X*]\s*([+-]?\d{1,9})")
-MEMBERS = {name: cls for family in FAMILIES.values() for name, cls in family.members.items()}
+MEMBERS: dict[str, type[Any]] = {name: cls for family in FAMILIES.values() for name, cls in family.members.items()}
+MEMBERS[Marching.name] = Marching
 _MOST_POINTS = 100_000
 
 OTHERS = tuple(family for family in FAMILIES if family != "volumetric")
@@ -97,7 +99,8 @@ class Point:
     """One measurement, as plain data: what travels to a worker.
 
     Attributes:
-        description: scene, lights, size, one technique of each family with all of its parameters, truth, measuring.
+        description: scene, lights, size, one technique of each family with all of its parameters, how rays are marched
+            where the specification says so, truth, measuring.
         scene_hash: of the scene's content (:func:`tyndall.lab.fingerprint.scene_hash`).
         refusal: why its technique cannot draw its scene; such a point is reported, not drawn.
     """
@@ -116,7 +119,8 @@ class Point:
     @property
     def stage(self) -> str:
         """What it shares with points that can be drawn one after the other on one stage."""
-        return json.dumps([self.description[name] for name in ("scene", "lights", "size", *OTHERS, "seed")])
+        names = ("scene", "lights", "size", *OTHERS, Marching.name, "seed")
+        return json.dumps([self.description.get(name) for name in names])
 
     def __str__(self) -> str:
         d = self.description
@@ -595,6 +599,7 @@ def _undrawn(record: _Record) -> Iterator[tuple[Location, str]]:
     """Parameters of techniques that no product draws."""
     fields = ("techniques", *OTHERS)
     drawn = {choice.name for part in record.products() for field in fields for choice in getattr(part, field)}
+    drawn.add(Marching.name)
     for loc, part in [((), record), *((("parts", i), part) for i, part in enumerate(record.parts))]:
         for name in part.parameters:
             if name not in drawn:
@@ -610,12 +615,14 @@ def _expand(part: _Part, scenes: _Scenes) -> Iterator[Point]:
         scene, digest = scenes.get(name, lights)
         others = [list(_made(family, getattr(part, family), part.parameters, scene)) for family in OTHERS]
         volumetric = list(_made("volumetric", part.techniques, part.parameters, scene))
-        for size, *stage, technique in itertools.product(part.sizes, *others, volumetric):
+        rays = list(_marched(part.parameters.get(Marching.name, {}), scene))
+        for size, *stage, marching, technique in itertools.product(part.sizes, *others, rays, volumetric):
             description = {
                 "scene": scenes.resolve(name),
                 "lights": len(scene.lights),
                 "size": list(size),
                 **{family: _plain(made) for family, made in zip(OTHERS, stage, strict=True)},
+                **({Marching.name: marching} if marching else {}),
                 "technique": _plain(technique),
                 "truth": part.truth,
                 **{f.name: getattr(part, f.name) for f in fields_of(Measuring)},
@@ -631,6 +638,17 @@ def _made(
         values = {**parameters.get(choice.name, {}), **choice.values}
         for combination in itertools.product(*values.values()):
             yield make(family, choice.name, scene, {choice.name: dict(zip(values, combination, strict=True))})
+
+
+def _marched(values: Mapping[str, tuple[Any, ...]], scene: Scene) -> Iterator[Plain]:
+    """How rays are marched: every combination of the parameters that are given; nothing where none is, or where there
+    is nothing to march through."""
+    if not values or not scene.implicits:
+        yield {}
+        return
+    for combination in itertools.product(*values.values()):
+        marching = Marching.of(scene.looks, dict(zip(values, combination, strict=True)))
+        yield {f.name: getattr(marching, f.name) for f in fields_of(Marching)}
 
 
 def _refusal(techniques: Sequence[Technique], scene: Scene) -> str | None:

@@ -96,6 +96,14 @@ def test_parts_start_from_the_fields_around_them() -> None:
     assert (off["size"], off["frames"]) == ([64, 36], 0)
 
 
+def test_how_rays_are_marched_varies_where_there_is_something_to_march_through() -> None:
+    found = descriptions(
+        {"scenes": ["swarm:10", "box"], "techniques": "off", "parameters": {"marching": {"steps": [64, 256]}}}
+    )
+    assert [d.get("marching", {}).get("steps") for d in found] == [64, 256, None]
+    assert found[0]["marching"]["distance"] == found[1]["marching"]["distance"] > 0, "with all of its parameters"
+
+
 def test_a_judge_has_all_of_its_settings() -> None:
     (point,) = descriptions({"scenes": "box", "techniques": "off", "truth": {"judge": "traced", "target": 0.02}})
     assert point["truth"]["judge"] == "traced"

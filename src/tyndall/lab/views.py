@@ -13,6 +13,7 @@ They are drawn through the pixels' centres, without any technique's work.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -25,6 +26,7 @@ from tyndall.lab.closeup import heat
 from tyndall.lab.picture import Picture
 from tyndall.lab.stage import adapter_name
 from tyndall.scene.model import Implicit, Scene
+from tyndall.sdf.marching import Marching
 from tyndall.sdf.shape import Shape, union
 from tyndall.techniques.shadow import ShadowMap
 
@@ -37,8 +39,18 @@ _BAR = 96
 _GREY = (70, 70, 74)
 
 
-def render_view(scene: Scene, name: str, size: tuple[int, int], *, adapter: str | Gpu | None = None) -> Picture:
+def render_view(
+    scene: Scene,
+    name: str,
+    size: tuple[int, int],
+    *,
+    marching: Mapping[str, Any] | None = None,
+    adapter: str | Gpu | None = None,
+) -> Picture:
     """A view of a scene.
+
+    Args:
+        marching: parameters of :class:`~tyndall.sdf.marching.Marching` in place of the scene's.
 
     Raises:
         GpuError: no such adapter, or a size beyond its limits.
@@ -48,7 +60,8 @@ def render_view(scene: Scene, name: str, size: tuple[int, int], *, adapter: str 
     gpu = adapter if isinstance(adapter, Gpu) else Gpu(adapter)
     try:
         plain: dict[str, Any] = {"volumetric": "off", "shadow": ShadowMap(size=16), "antialiasing": "none"}
-        with Renderer(scene, size, gpu=gpu, occlusion="none", **plain) as renderer:
+        rays = Marching.of(scene.looks, marching)
+        with Renderer(scene, size, gpu=gpu, occlusion="none", marching=rays, **plain) as renderer:
             renderer.draw(casters=False)
             made = {"scene": scene.name, "view": name, "adapter": adapter_name(gpu)}
             return Picture(view(renderer, name), renderer.radiance(), renderer.depth(), made)

@@ -16,6 +16,10 @@ elsewhere is one buffer write, and nothing is pruned again; moving a part of it 
 four instructions or fewer need no cells, and what has no end has none: all of its program is run. Lists that do not fit
 are the parent's, and where cells of all objects do not fit some have fewer: slower, never wrong.
 
+Parts that move in one frame are best given together (:meth:`Field.move_all`): their transforms are then inverted and
+written at once. Of many leaves that are only moved the places alone are sent, a tenth of what their slots hold, and the
+device puts them into the slots.
+
 What shaders need is in :attr:`Field.bindings`: five buffers, and in the bindings module itself a switch over the kinds
 of primitives that are in use.
 """
@@ -41,7 +45,7 @@ from tyndall.sdf.marching import Marching
 from tyndall.sdf.program import TURNED, Kinds, Leaf, Part, Program, compile_shape
 from tyndall.sdf.shading import ShadedMaterial, Shadings
 from tyndall.sdf.shading import validate as validate_shader
-from tyndall.sdf.shape import Box, Floats, Shape
+from tyndall.sdf.shape import Box, Floats, Painted, Shape
 from tyndall.sdf.snippets import validate
 
 OWNER = "implicit"
@@ -87,6 +91,7 @@ class _Parts:
     after: Floats
     factors: Floats
     rest: Floats  # (3, N)
+    flat: NDArray[np.bool_]
     leaf_at: slice | NDArray[np.intp]
     spans: tuple[tuple[int, int], ...]  # of slots, that are written when they move
     is_straight: bool
@@ -111,6 +116,7 @@ class _Parts:
             after,
             np.array([p.factor for p in parts]),
             np.ascontiguousarray((before[:, :3, 3] + after[:, :3, 3]).T),
+            np.array([p.flat for p in parts]),
             _evenly(leaves),
             ((int(slots.min()), int(slots.max()) + _LEAF_SLOTS),),
             bool((linear == np.eye(3)).all()) and all(p.leaf >= 0 for p in parts),
@@ -122,7 +128,7 @@ class _Parts:
         """Those of several names, one after another, to be turned at once."""
         if len(sets) == 1:
             return sets[0]
-        arrays = ("numbers", "slots", "entries", "leaves", "before", "after", "factors")
+        arrays = ("numbers", "slots", "entries", "leaves", "before", "after", "factors", "flat")
         together: dict[str, Any] = {what: np.concatenate([getattr(p, what) for p in sets]) for what in arrays}
         spans: list[tuple[int, int]] = []
         for low, high in sorted(span for parts in sets for span in parts.spans):
@@ -162,6 +168,11 @@ class _Parts:
     def scopes(self) -> NDArray[np.intp]:
         """First slots of transforms around more than a leaf."""
         return self.slots[~self.owned]
+
+
+def _leaves_plane(moves: Floats) -> bool:
+    """Whether one of (N, 3 or 4, 3 or 4) turns what lies in the plane of x and y out of it."""
+    return bool(moves[:, 2, :2].any() or moves[:, :2, 2].any())
 
 
 def _evenly(numbers: NDArray[np.intp]) -> slice | NDArray[np.intp]:
@@ -225,11 +236,14 @@ class _Object:
 
     def __post_init__(self) -> None:
         self.at_rest = self.implicit.shape
+        # An edit changes leaves, and a field of the same shapes may come to have the same program.
+        self.program = dataclasses.replace(self.program, leaves=list(self.program.leaves))
         self.placement = np.array(self.implicit.transform, np.float64)
         placements = np.array([leaf.placement for leaf in self.program.leaves])
         self.linear = placements[:, :3, :3].copy()  # of the leaves, and (3, leaves) where they are
         self.places = np.ascontiguousarray(placements[:, :3, 3].T)
         self.is_straight = bool((self.linear == np.eye(3)).all())
+        self.leaf_slots = np.array([leaf.slot for leaf in self.program.leaves])
 
     def together(self, sets: Sequence[_Parts]) -> _Parts:
         """:meth:`_Parts.joined`, once for all frames."""
@@ -306,12 +320,16 @@ class Field(Closing):
         self._gpu, self._owner, self._pruning = gpu, owner, pruning
         self._marching = marching or Marching()
         self._kinds, self._shadings, self._stacks = Kinds(), Shadings(), (1, 1)
+        self._compiled: dict[int, tuple[Any, Program]] = {}  # by the shapes' ids
         self._buffers: list[Buffer] = []
         self._params: ParamsBuffer | None = None
+        self._before_buffer: Buffer | None = None  # slots as they were when `remember` was called last
+        self._is_remembered = self._is_known = False  # as they are now; as they were in some frame
         self._objects: list[_Object] = []
         self._lists: dict[tuple[_Object, str], tuple[Buffer, Buffer]] = {}  # places and slots of many leaves of a name
         self._listed: set[tuple[_Object, str]] = set()  # whose last motion was sent as such a list
         self._waiting: set[tuple[_Object, str]] = set()  # and is not in the slots yet
+        self._jobs_written: list[list[Any]] = []  # what the jobs' buffer holds: in motion mostly what it is to hold
         self.uploaded = 0
         try:
             self._upload(implicits, self._compile(implicits, like))
@@ -322,15 +340,21 @@ class Field(Closing):
     def _compile(self, implicits: Sequence[Implicit], like: Field | None) -> list[Program]:
         """The objects' programs, with kinds and shaders numbered as another field has them if the set is the same."""
         shapes: list[Any] = [one.shape for one in implicits]
-        kinds = Kinds(like._kinds if like else None)
-        programs = [compile_shape(shape, kinds) for shape in shapes]
+        kinds, programs = Kinds(like._kinds if like else None), []
+        for shape in shapes:
+            known = like._compiled.get(id(shape)) if like else None
+            if known is None:
+                programs.append(compile_shape(shape, kinds))
+            else:
+                programs.append(known[1])
+                kinds.ask(known[1])
         if not kinds.is_tight:
-            kinds = Kinds()
-            programs = [compile_shape(shape, kinds) for shape in shapes]
+            kinds, programs = kinds.tightened(programs)
+        self._compiled = {id(shape): (shape, made) for shape, made in zip(shapes, programs, strict=True)}
         materials = [m for one, made in zip(implicits, programs, strict=True) for m in (one.material, *made.materials)]
         shaders = {m.shader for m in materials if isinstance(m, ShadedMaterial)}
-        known = like._shadings if like else None
-        self._kinds, self._shadings = kinds, Shadings(known if known and shaders >= set(known.shaders) else None)
+        others = like._shadings if like else None
+        self._kinds, self._shadings = kinds, Shadings(others if others and shaders >= set(others.shaders) else None)
         for material in materials:
             self._shadings.of(material)
         self._stacks = max([1, *(p.values for p in programs)]), max([1, *(p.places for p in programs)])
@@ -519,6 +543,31 @@ class Field(Closing):
 
     # --- motion ---
 
+    def moved_parts(self) -> NDArray[np.bool_]:
+        """(objects,): whether parts have moved since :meth:`update` was called last."""
+        return np.array([made.moved for made in self._objects], bool)
+
+    @property
+    def remembers(self) -> bool:
+        """Whether it is known where parts were: :meth:`remember` has been called."""
+        return self._is_known
+
+    def remember(self) -> None:
+        """Record where all parts are, after what asks where they were."""
+        if self._before_buffer is None:
+            self._before_buffer = self._buffer("slots_before", self._slot_buffer.size_bytes, "vec4f")
+        elif self._is_remembered:
+            return
+        size = self._slot_buffer.size_bytes
+        self._gpu.encoder.copy_buffer_to_buffer(self._slot_buffer.native, 0, self._before_buffer.native, 0, size)
+        self._is_remembered = self._is_known = True
+
+    @property
+    def before(self) -> dict[str, Any]:
+        """What ``flow.wesl`` binds beyond :attr:`bindings`."""
+        assert self._before_buffer is not None
+        return {"implicit_slots_before": self._before_buffer.read()}
+
     def place(self, index: int, transform: Any) -> None:
         """An object stands elsewhere: one write, and nothing is pruned again."""
         made, row = self._objects[index], self._rows[index]
@@ -537,7 +586,7 @@ class Field(Closing):
 
         Raises:
             ParameterError: no such name, parts inside of a twist, bend or repetition without end, another number of
-                transforms, or one that has no inverse.
+                transforms, or one that has no inverse or turns a flat part out of its plane.
         """
         self.move_all({name: matrices})
 
@@ -584,6 +633,7 @@ class Field(Closing):
         for parts, given in listed:
             made.moves[parts.name] = given
         made.dirty = made.moved = True
+        self._is_remembered = False
 
     def _shift(self, made: _Object, parts: _Parts, ways: Floats) -> None:
         """Write the places of leaves that are only moved."""
@@ -614,10 +664,20 @@ class Field(Closing):
         """Write the transforms of parts that are turned, or not leaves: of the names in ``listed``, all together."""
         moves = listed[0][1] if len(listed) == 1 else np.concatenate([moves for _, moves in listed])
         placed = parts.before @ moves @ parts.after
-        stretch = _least_stretches(moves[:, :3, :3])
-        if (stretch < 1e-9).any():
-            flat = next(one.name for one, moves in listed if (_least_stretches(moves[:, :3, :3]) < 1e-9).any())
-            raise ParameterError(f"{flat}: a transform that has no inverse")
+        linear, flat = moves[:, :3, :3], parts.flat
+        if flat.any():
+            if _leaves_plane(linear[flat]):
+                name = next(one.name for one, moves in listed if _leaves_plane(moves[one.flat]))
+                raise ParameterError(
+                    f"{name}: it is turned out of the plane that it lies in; name what is extruded or revolved"
+                )
+            # Whatever is done across its plane changes nothing in it, and must not be its least stretch.
+            linear = linear.copy()
+            linear[flat, 2, 2] = np.abs(linear[flat, :2, :2]).sum(axis=(1, 2))
+        stretch = _least_stretches(linear)
+        if (stretch < 1e-9).any() or (moves[:, 2, 2][flat] == 0).any():
+            name = next(one.name for one, moves in listed if (_least_stretches(moves[:, :3, :3]) < 1e-9).any())
+            raise ParameterError(f"{name}: a transform that has no inverse")
         rows = np.linalg.inv(placed)[:, :3]
         factors = parts.factors * stretch
         for one, _ in listed:  # what is written whole must not be put back where it was
@@ -681,8 +741,7 @@ class Field(Closing):
     def _shrink(self, made: _Object) -> None:
         """Take note of leaves that motion makes smaller: what a smooth union adds to them is not, and so is more of
         their own boxes."""
-        slots = np.array([leaf.slot for leaf in made.program.leaves])
-        stretch = self._slots[made.first_slot + 1 + slots, 3] / made.program.slots[slots, 3]
+        stretch = self._slots[made.first_slot + 1 + made.leaf_slots, 3] / made.program.slots[made.leaf_slots, 3]
         sizes = np.exp2(np.floor(np.log2(np.minimum(stretch, 1.0)) + 1e-3))
         if made.sizes is None or not np.array_equal(sizes, made.sizes):
             made.sizes, made.halves = sizes, None
@@ -724,9 +783,9 @@ class Field(Closing):
             self._slots[at + 3, 1] *= shape.lipschitz / leaf.shape.lipschitz
             self._write(self._slot_buffer, self._slots[at + 1 : at + 4], 16 * (at + 1))
         made.halves = None
-        made.edits.setdefault(name, {}).update(changes)
+        made.edits.setdefault(parts.name, {}).update(changes)
         if made.program.sag < 0:  # its box is that of the whole expression
-            edited = made.shape.edited(name, changes)
+            edited = made.shape.edited(parts.name, changes)
             made.implicit, made.has_hull = dataclasses.replace(made.implicit, shape=edited), False
         made.dirty = made.moved = True
 
@@ -805,6 +864,7 @@ class Field(Closing):
 
     def forget(self) -> None:
         """What was recorded is never submitted: the next :meth:`update` records it again."""
+        self._is_remembered = self._is_known = False
         for made in self._objects:
             made.dirty = True
         self._waiting = set(self._listed)
@@ -837,14 +897,18 @@ class Field(Closing):
             jobs[i] = made.jobs
         listed = [job for made in jobs.values() for job in made]
         made_of = [self._objects[i] for i, made in jobs.items() for _ in made]
-        table = np.zeros(len(listed), gpu.dtype(_JOB))
-        for number, job in enumerate(listed):
-            table[number] = job
-        gpu.write(self._job_buffer, table)
+        written = self._jobs_written
+        if [id(made) for made in jobs.values()] != [id(made) for made in written]:
+            table = np.zeros(len(listed), gpu.dtype(_JOB))
+            for number, job in enumerate(listed):
+                table[number] = job
+            gpu.write(self._job_buffer, table)
+            self._jobs_written = list(jobs.values())
         for i in dirty:
             gpu.clear_buffer(self._counter_buffer, 4 * _COUNTERS * i, 4 * _COUNTERS)
         scope = {
-            **{name: bound for name, bound in self.bindings.items() if name in ("implicit_objects", "implicit_slots")},
+            "implicit_objects": self.bindings["implicit_objects"],
+            "implicit_slots": self.bindings["implicit_slots"],
             "implicit_lists": self._list_buffer.read_write(),
             "implicit_cells": self._cell_buffer.read_write(),
             "implicit_counters": self._counter_buffer.read_write(),
@@ -919,9 +983,13 @@ def check_snippets(gpu: Gpu, implicit: Implicit) -> None:
     Raises:
         SnippetError: with the place in the user's file.
     """
-    nodes: list[Any] = list(paint.nodes_of(implicit.shape))
-    for source in {node.source for node in nodes if getattr(node, "untrusted", False)}:
-        validate(gpu, source)
-    for material in (implicit.material, *paint.materials_of(implicit.shape)):
+    found: dict[int, Any] = {id(implicit.material): implicit.material}
+    for node in paint.nodes_of(implicit.shape):
+        if isinstance(node, Painted):
+            found.setdefault(id(node.surface), node.surface)
+        elif getattr(node, "untrusted", False):
+            source: Any = getattr(node, "source", None)
+            validate(gpu, source)
+    for material in found.values():
         if isinstance(material, ShadedMaterial):
             validate_shader(gpu, material.shader)

@@ -13,7 +13,7 @@ from tyndall.gpu.device import Gpu, GpuError
 from tyndall.gpu.params import ParameterError
 from tyndall.lab import field_check
 from tyndall.scene.model import Implicit, translations
-from tyndall.sdf import Grid, Shape, box, cylinder, intersection, sphere, subtraction, torus, union
+from tyndall.sdf import Grid, Shape, box, circle, cylinder, intersection, rectangle, sphere, subtraction, torus, union
 from tyndall.sdf.field import Field
 from tyndall.sdf.marching import Marching
 from tyndall.sdf.shape import Blend, rotation
@@ -254,6 +254,22 @@ def test_scaled_parts_are_pruned_by_their_new_slopes(gpu: Gpu, factor: float) ->
         for name in ("outer", "inner"):
             field.move(name, scale)
         agree(gpu, field, 0, shape.moved({"outer": iter(scale), "inner": iter(scale)}))
+
+
+def test_a_flat_part_is_moved_within_its_plane(gpu: Gpu) -> None:
+    """What is done across the plane changes no distance in it; out of the plane it cannot go."""
+    one, two = rectangle((0.3, 0.2)).named("flat"), union(rectangle((0.3, 0.2)), circle(0.1).at(0.2)).named("flat")
+    shape = one.rotate(0.4).at(0.3, 0.1).extrude(0.5) | union(two.at(0.4), circle(0.2).at(0.6)).revolve().at(2)
+    shallow, wide = np.diag([0.8, 0.6, 0.1, 1]), rotation(0.5, (0, 0, 1)) @ np.diag([1.5, 2.0, 9.0, 1])
+    wide[:3, 3] = 0.2, -0.1, 0.3
+    with Field(gpu, [Implicit(shape)]) as field:
+        for matrix in (shallow, wide):
+            given = np.stack([matrix, matrix])
+            field.move("flat", given)
+            agree(gpu, field, 0, moved(shape, "flat", given), 2000)
+        for out, said in ((rotation(0.1, (1, 0, 0)), "out of the plane"), (np.diag([1.0, 1, 0, 1]), "no inverse")):
+            with pytest.raises(ParameterError, match=f"flat: .*{said}"):
+                field.move("flat", np.stack([np.eye(4), out]))
 
 
 @pytest.mark.parametrize("size", [0.5, 0.2, 0.05])

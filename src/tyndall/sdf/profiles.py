@@ -50,6 +50,7 @@ class Profile(Primitive):
 
     dimension = 2
     module: ClassVar[str] = "package::sdf::profiles"
+    measured: ClassVar[bool] = True
 
 
 def folded(p: Floats) -> Floats:

@@ -36,7 +36,8 @@ and what it changes is multiplied by s at each further one. That a change be 10�
 more than 7.02 of those k above the whole, however many unions there are (fifteen, with equal shares, are the worst).
 
 Affine transforms are multiplied into the leaves below, except around what changes places by itself and around parts
-with a name, which move as one.
+with a name, which move as one. Of a leaf without a name that is then only enlarged, or round about places that are its
+parameters, parameters take them in: it is not TURNED, and has three rows less to read.
 """
 
 from __future__ import annotations
@@ -104,10 +105,29 @@ class Kinds:
             self.version += 1
         return known[key][0]
 
+    def ask(self, program: Program) -> None:
+        """Ask for all that a program has, which was compiled with these numbers."""
+        tables: tuple[Any, Any] = self._primitives, self._modifiers
+        for known, codes in zip(tables, program.codes, strict=True):
+            keys: list[Any] = list(known)
+            self._asked |= {keys[code] for code in np.unique(codes).tolist()}
+
     @property
     def is_tight(self) -> bool:
         """Whether it holds none that was never asked for."""
         return len(self._asked) == len(self._primitives) + len(self._modifiers)
+
+    def tightened(self, programs: Sequence[Program]) -> tuple[Kinds, list[Program]]:
+        """Those that were asked for alone, in the same order, and programs with their numbers."""
+        made, tables = Kinds(), []
+        for known in (self._primitives, self._modifiers):
+            each: dict[Any, tuple[int, Any]] = known
+            table = np.zeros(len(each), np.uint32)
+            for key, (code, shape) in each.items():
+                if key in self._asked:
+                    table[code] = made.of(shape)
+            tables.append(table)
+        return made, [program.renumbered(*tables) for program in programs]
 
     def sources(self) -> list[Any]:
         """The texts among them that a user wrote (:class:`~tyndall.sdf.snippets.SnippetSource`)."""
@@ -196,6 +216,7 @@ class Part:
         before, after: 4×4, from its parent's space to the object's (or the scope's), and from its own to its parent's.
         factor: distances at rest, of the leaf or the transform.
         held: what is around it whose numbers follow from where it is at rest, so that it cannot move; "" for nothing.
+        flat: it is a shape in the plane, and stays in it.
     """
 
     number: int
@@ -206,6 +227,7 @@ class Part:
     after: Floats
     factor: float
     held: str = ""
+    flat: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -253,6 +275,26 @@ class Program:
     def size(self) -> int:
         """Instructions."""
         return len(self.words)
+
+    @property
+    def codes(self) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]:
+        """Which primitives its leaves are, and which modifiers its scopes."""
+        words = self.words[:, 0]
+        leaves, scopes = self._coded
+        low = np.uint32(0xFFFF)
+        return words[leaves] & low, words[scopes] & low
+
+    @property
+    def _coded(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        kinds, codes = self.words[:, 0] >> 16 & 0xF, self.words[:, 0] & 0xFFFF
+        return kinds == LEAF, ((kinds == ENTER) | (kinds == LEAVE)) & (codes != AFFINE)
+
+    def renumbered(self, primitives: NDArray[np.uint32], modifiers: NDArray[np.uint32]) -> Program:
+        """The same where each primitive and each modifier has another number."""
+        words = self.words.copy()
+        for table, where, codes in zip((primitives, modifiers), self._coded, self.codes, strict=True):
+            words[where, 0] = (words[where, 0] & ~np.uint32(0xFFFF)) | table[codes]
+        return replace(self, words=words)
 
     @cached_property
     def is_short_reaching(self) -> bool:
@@ -429,7 +471,9 @@ class _Compiler:
             self._depth -= 1
 
     def _leaf(self, shape: Primitive, c: _Context, join: int, blend: int, k: float) -> None:
-        placement = c.matrix if c.before is None else c.before @ c.matrix
+        placement, factor = c.matrix if c.before is None else c.before @ c.matrix, c.factor
+        if not c.name:
+            shape, placement, factor = _taken_in(shape, placement, factor)
         turned = not np.array_equal(placement[:3, :3], np.eye(3))
         flags = (TURNED if turned else 0) | (BORROWS if c.cuts and c.material is None else 0)
         numbers = [float(x) for x in shape.numbers]
@@ -441,7 +485,7 @@ class _Compiler:
             self._payload_rows.append(len(self._rows) + 1)
         margin = c.margin + min(c.shares, _MOST_WIDTHS * c.widest) if c.margin >= 0 else -1.0
         slot = self._put(
-            (*placement[:3, 3], c.factor),
+            (*placement[:3, 3], factor),
             numbers[:4],
             numbers[4:],
             (k, shape.lipschitz * c.stretch, float(self._material(c.material)), margin),
@@ -452,7 +496,8 @@ class _Compiler:
             self._put(*np.linalg.inv(placement)[:3])
         if c.name:
             assert c.before is not None
-            part = Part(c.number, slot, len(self._words), len(self._leaves), c.before, c.matrix, c.factor, c.held)
+            entry, leaf, flat = len(self._words), len(self._leaves), shape.dimension == 2
+            part = Part(c.number, slot, entry, leaf, c.before, c.matrix, c.factor, c.held, flat)
             self._names.setdefault(c.name, []).append(part)
         self._leaves.append(Leaf(slot, shape, placement, c.sag))
         self._word(LEAF, self._kinds.of(shape), join, blend, flags, slot)
@@ -550,7 +595,7 @@ class _Compiler:
             self._emit(shape, inside, PUSH, HARD, 0.0)
         self._places -= 1
         if name:
-            part = Part(number, slot, entry, -1, c.matrix, np.eye(4), factor, c.held)
+            part = Part(number, slot, entry, -1, c.matrix, np.eye(4), factor, c.held, shape.dimension == 2)
             self._names.setdefault(name, []).append(part)
         self._word(LEAVE, AFFINE, flags=flags, slot=slot)
 
@@ -588,6 +633,20 @@ def _below_unions(c: _Context, kind: int, width: float, count: int) -> _Context:
     if kind == EXPONENTIAL:  # is k·log₂(2) below two equal values, and nothing is left of one 24 k above the other
         return replace(c, margin=c.margin + 25.0 * count * width, sag=c.sag + count * width)
     return replace(c, shares=c.shares + count * width, widest=max(c.widest, width), sag=c.sag + 0.25 * count * width)
+
+
+def _taken_in(shape: Primitive, placement: Floats, factor: float) -> tuple[Primitive, Floats, float]:
+    """The leaf, where it is and its factor, once its parameters have taken in how it is turned and enlarged."""
+    linear = placement[:3, :3]
+    if np.array_equal(linear, np.eye(3)):
+        return shape, placement, factor
+    size = float(abs(np.linalg.det(linear))) ** (1 / 3)
+    turn = linear / size
+    if np.abs(turn @ turn.T - np.eye(3)).max() > 1e-9 or (made := shape.similar(turn, size)) is None:
+        return shape, placement, factor
+    moved = np.eye(4)
+    moved[:3, 3] = placement[:3, 3]
+    return made, moved, factor / size
 
 
 def _is_leaf(shape: Shape) -> bool:

@@ -234,8 +234,17 @@ def test_kinds_keep_the_numbers_of_others() -> None:
     assert same.is_tight
     assert (same.version, same.wesl()) == (first.version, first.wesl())
     fewer = Kinds(first)
-    compile_shape(box(), fewer)
+    program = compile_shape(torus() | (box() & torus()).twist(0.2), fewer)
     assert not fewer.is_tight
+    tight, (renumbered,) = fewer.tightened([program])
+    assert tight.is_tight
+    assert [tight.of(shape) for shape in (box(), torus())] == [0, 1]
+    alone = Kinds()
+    compile_shape(box(), alone)
+    np.testing.assert_array_equal(renumbered.words, compile_shape(torus() | (box() & torus()).twist(0.2), alone).words)
+    again = Kinds(tight)
+    again.ask(renumbered)
+    assert again.is_tight
     compile_shape(torus(), same)
     assert (same.version, first.version) == (4, 3), "the others are as they were"
 

@@ -420,10 +420,14 @@ class Primitive(Shape):
     Attributes:
         code: the name of that function.
         module: the WESL module that it is in.
+        measured: all its lengths are parameters in metres: it is enlarged by enlarging them.
+        places: which of them are places, of what is round about these: it is turned by turning them; None: it is not.
     """
 
     code: ClassVar[str]
     module: ClassVar[str] = "package::sdf::solids"
+    measured: ClassVar[bool] = False
+    places: ClassVar[tuple[str, ...] | None] = None
 
     @property
     def payload(self) -> NDArray[np.float32] | None:
@@ -438,6 +442,24 @@ class Primitive(Shape):
     def numbers(self) -> tuple[float, ...]:
         """What the WESL function gets, at most 8; the declared parameters in order unless told otherwise."""
         return _numbers(self)
+
+    def similar(self, turn: Floats, size: float) -> Primitive | None:
+        """Itself turned about 0 by an orthogonal 3×3 and enlarged; None where parameters cannot say that."""
+        turns = bool(np.abs(turn - np.eye(3)).max() > 1e-12)
+        if not self.measured or (turns and self.places is None):
+            return None
+        changes: dict[str, Any] = {}
+        for f in fields_of(type(self)):
+            if f.param.unit == "m":
+                value = np.asarray(getattr(self, f.name), np.float64)
+                made = size * (turn @ value if turns and f.name in (self.places or ()) else value)
+                changes[f.name] = tuple(made.tolist()) if made.ndim else float(made)
+        try:
+            whole: Any = self
+            similar: Primitive = replace(whole, **changes)
+            return similar
+        except ParameterError:  # smaller than it may be
+            return None
 
     @property
     def corners(self) -> Box:

@@ -22,7 +22,7 @@ from tyndall.scene.model import Implicit, Material, Volume
 from tyndall.sdf import X, Y, Z
 from tyndall.sdf.modifiers import Bend, Displace, Elongate, Extrude, Mirror, Noise, Revolve, Round, Shell, Twist
 from tyndall.sdf.profiles import PROFILES
-from tyndall.sdf.program import Kinds, compile_shape
+from tyndall.sdf.program import TURNED, Kinds, compile_shape
 from tyndall.sdf.repetition import Cell, MirroredForever, Polar, Repeated, RepeatedForever, Repetition
 from tyndall.sdf.shape import MOST_DEEP, Combination, Floats, Modifier, Named, Painted, Primitive, Shape, Transformed
 from tyndall.sdf.solids import SOLIDS
@@ -209,6 +209,38 @@ def test_a_name_means_one_thing() -> None:
             assert all(type(x) is float for x in map(float, shape.numbers)), name
 
 
+@pytest.mark.parametrize("name", [name for name, shape in CASES.items() if isinstance(shape, Primitive)])
+def test_a_primitive_is_enlarged_and_turned_by_its_parameters(name: str) -> None:
+    shape = CASES[name]
+    assert isinstance(shape, Primitive)
+    turn = np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))[0]
+    p = places(shape, 300)
+    for matrix in (np.eye(3), turn):
+        made = shape.similar(matrix, 1.7)
+        if made is None:
+            assert matrix is turn
+            assert shape.places is None
+            continue
+        assert np.allclose(made(1.7 * p @ matrix.T), 1.7 * shape(p), rtol=1e-9, atol=1e-9)
+
+
+def test_what_is_enlarged_is_not_turned() -> None:
+    """A leaf takes transforms in where its parameters can, and has the same values; a named one keeps its own."""
+    shapes = (
+        sdf.round_cone().rotate(0.7, (1, 2, 3)).scale(1.5).at(0.1, 0.2),
+        sdf.ellipsoid().scale(0.4).at(1),
+        sdf.sphere(0.3).rotate(1).scale(3),
+    )
+    program = compile_shape(sdf.union(*shapes), Kinds())
+    assert not (program.words[:, 0] & TURNED).any()
+    for leaf, shape in zip(program.leaves, shapes, strict=True):
+        p = places(shape, 100)
+        assert program.slots[leaf.slot, 3] == pytest.approx(1)
+        assert np.allclose(leaf.shape(p - leaf.placement[:3, 3]), shape(p), atol=1e-12)
+    kept = sdf.union(sdf.sphere(0.3).scale(2).named("part"), sdf.sphere().scale((1, 1, 2)), sdf.box().rotate(1))
+    assert (compile_shape(kept, Kinds()).words[:, 0] & TURNED).all()
+
+
 # --- the device ---------------------------------------------------------------------------------------------------
 
 
@@ -296,6 +328,30 @@ def test_the_device_has_the_same_values(gpu: Gpu, first: int) -> None:
         away = np.abs(values[i] - CASES[name](at[i]))
         allowed = 1e-5 * CASES[name].lipschitz * (1 + np.linalg.norm(at[i], axis=1))
         assert (away <= allowed).all(), f"{name}: {(away / allowed).max():.1f} times what is allowed"
+
+
+def test_an_ellipsoid_is_as_exact_as_its_places_on_the_device(gpu: Gpu) -> None:
+    """Half axes of 1 : 1 to 1 : 100, next to the surface and far away; where the distance is known."""
+    rng = np.random.default_rng(4)
+    radii = np.exp(rng.uniform(math.log(0.011), 0, (12, 3)))
+    radii = (radii / radii.max(axis=1, keepdims=True)).astype(np.float32).astype(np.float64)
+    turn = rng.normal(size=(12, 300, 3))
+    surface = turn / np.linalg.norm(turn, axis=2, keepdims=True) * radii[:, None]
+    normal = surface / radii[:, None] ** 2
+    away = 10 ** rng.uniform(-3, 1.5, (12, 300))
+    at = surface + normal / np.linalg.norm(normal, axis=2, keepdims=True) * away[..., None]
+    listed = ", ".join(f"vec3f({', '.join(repr(float(x)) for x in row)})" for row in radii)
+    text = f"""import package::sdf::solids::ellipsoid_distance;
+fn evaluate(x: vec4f) -> vec4f {{
+    var radii = array<vec3f, 12>({listed});
+    return vec4f(ellipsoid_distance(x.xyz, radii[u32(x.w)]));
+}}"""
+    which = np.broadcast_to(np.arange(12.0)[:, None, None], (12, 300, 1))
+    inputs = np.concatenate([at, which], axis=2).reshape(-1, 4).astype(np.float32)
+    values = props.evaluate(gpu, "test_vocabulary_ellipsoids", text, inputs)[:, 0].reshape(away.shape)
+    assert (np.abs(values - away) <= 1e-6 * (1 + np.linalg.norm(at, axis=2))).all()
+    for row, places_, distances in zip(radii, at, away, strict=True):
+        assert np.allclose(sdf.ellipsoid(tuple(row.tolist()))(places_), distances, rtol=1e-9, atol=1e-12)
 
 
 # --- what a node says of itself -----------------------------------------------------------------------------------
@@ -418,7 +474,7 @@ def test_an_ellipsoid_is_what_the_sphere_around_a_long_search_finds() -> None:
     turn = np.random.default_rng(0).normal(size=(200_000, 3))
     for radii in ((1, 0.7, 0.5), (0.2, 1.5, 0.4)):
         surface = turn / np.linalg.norm(turn, axis=1)[:, None] * radii
-        p = np.random.default_rng(1).uniform(-2, 2, (40, 3))
+        p = np.random.default_rng(1).uniform(-2, 2, (12, 3))
         least = np.array([np.linalg.norm(surface - place, axis=1).min() for place in p])
         got = sdf.ellipsoid(radii)(p)
         outside = got > 0

@@ -36,6 +36,7 @@ class Technique:
         lights_air: whether it asks the shadow technique about points in the air.
         casts_rays: whether it asks :attr:`View.world`; the frame then builds it before it records anything.
         tests_depth: whether it draws against the picture's depth buffer, beyond asking for a pixel's depth.
+        reads_motion: whether it asks where what a pixel shows was in the last frame (``motion.wesl``).
         receivers: what a shadow technique shades: all surfaces, or flat ones only ("planes"); the rest is lit.
     """
 
@@ -46,6 +47,7 @@ class Technique:
     lights_air: ClassVar[bool] = True
     casts_rays: ClassVar[bool] = False
     tests_depth: ClassVar[bool] = False
+    reads_motion: ClassVar[bool] = False
     receivers: ClassVar[Literal["all", "planes"]] = "all"
 
     def __post_init__(self) -> None:

@@ -312,14 +312,16 @@ def _named(row: Row) -> str:
 
 
 def _flat(point: Mapping[str, Any]) -> dict[str, Any]:
-    """A point as names and values: each technique by its family, and its parameters as ``technique.parameter``."""
+    """A point as names and values: each technique by its family, and its parameters as ``technique.parameter``;
+    those of rays as ``marching.parameter``."""
     flat: dict[str, Any] = {}
     for name, value in point.items():
         if name in _MEASURING:
             continue
         if isinstance(value, Mapping):
-            technique = str(value.get("technique"))
-            flat[name] = technique
+            technique = str(value.get("technique", name))
+            if "technique" in value:
+                flat[name] = technique
             flat |= {f"{technique}.{key}": v for key, v in value.items() if key != "technique"}
         else:
             flat[name] = Path(value).name if name == "scene" else value

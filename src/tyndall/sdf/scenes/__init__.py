@@ -17,6 +17,6 @@ from tyndall.sdf.scenes.snail import snail as snail
 from tyndall.sdf.scenes.swarm import swarm as swarm
 from tyndall.sdf.scenes.temple import temple as temple
 
-NODES: dict[str, int] = {"portrait": 762, "snail": 1124, "jumper": 683, "temple": 1377, "swarm": 4003}
+NODES: dict[str, int] = {"portrait": 762, "snail": 1060, "jumper": 683, "temple": 1377, "swarm": 4003}
 """Nodes of the shapes of each, known without building anything; ``swarm`` has four for each
 primitive, and three; this is its default."""

@@ -21,8 +21,8 @@ from tyndall.sdf.solids import box, torus
 VIEWER = (1.9, 2.35, 9.2)
 SUN = (0.46, -0.66, -0.50)
 WHORL = 0.47  # of the size a turn further out
-TURNS = 3.3
-PIECES = 16  # of a turn
+TURNS = 3.1
+PIECES = 16  # of the outermost turn; smaller turns have fewer
 SHELL = (-0.5, 1.72, 0.0)  # m, middle of the shell
 
 SKIN = paint("#d9a677", 0.42)
@@ -68,17 +68,26 @@ def whorl(turn: ArrayLike) -> tuple[Floats, Floats, Floats]:
     return centres, 0.43 * size, out
 
 
+def _along(first: float, last: float) -> Floats:
+    """Turns inwards at which the pieces of a spiral meet: fewer to a turn as it gets smaller."""
+    rate = -0.3 * math.log(WHORL)
+    low, high = -math.expm1(-rate * first) / rate, -math.expm1(-rate * last) / rate
+    steps = np.linspace(low, high, round(PIECES * (high - low)) + 1)
+    return np.asarray(-np.log1p(-rate * steps) / rate)
+
+
 def _shell() -> Shape:
-    turns = np.linspace(0, TURNS, round(TURNS * PIECES) + 1)
+    turns = _along(0, TURNS)
     centres, radii, _ = whorl(turns)
     tube: list[Shape] = []
     for i in range(len(turns) - 1):
         shade = min(len(BANDS) - 1, int(len(BANDS) * (1 - turns[i] / TURNS)))
         piece = limb(centres[i], centres[i + 1], float(radii[i]), float(radii[i + 1]))
         tube.append(piece.material(BANDS[shade]))
+    tube.append(ball((0, 0, centres[-1, 2]), 0.08).material(BANDS[0]))
     stripes: list[Shape] = []
-    for lift, size, last in ((0.5, 0.105, 2.1), (-0.25, 0.07, 1.2), (1.05, 0.07, 2.1)):
-        along = np.linspace(0.02, last, round(last * PIECES) + 1)
+    for lift, size, last in ((0.5, 0.105, 1.7), (-0.25, 0.07, 1.2), (1.05, 0.07, 1.7)):
+        along = _along(0.02, last)
         middle, radius, outward = whorl(along)
         way = math.cos(lift) * outward + math.sin(lift) * np.array([0, 0, 1.0])
         places = middle + (0.955 * radius)[:, None] * way
@@ -89,8 +98,19 @@ def _shell() -> Shape:
     mouth, wide, _ = whorl([0.0])
     forward = (math.sin(0.95), math.cos(0.95), 0.0)
     lip = torus(float(wide[0]) * 0.97, 0.075).orient(forward).at(*mouth[0]).material(LIP)
-    whole = union(union(*tube, smooth=0.045), union(*stripes, smooth=0.02).material(STRIPE), lip, smooth=0.025)
-    return whole.transform(POSE)
+    whole = union(union(*tube, smooth=0.03), union(*stripes).material(STRIPE), lip, smooth=0.02)
+    drops = []
+    for turn, lift, size in (
+        (0.19, 0.7, 0.07),
+        (0.3, 1.0, 0.055),
+        (0.42, 0.5, 0.08),
+        (1.24, 0.9, 0.05),
+        (0.08, 0.8, 0.05),
+    ):
+        middle, radius, outward = whorl([turn])
+        way = math.cos(lift) * outward[0] + math.sin(lift) * np.array([0, 0, 1.0])
+        drops.append(ball(POSE[:3, :3] @ (middle[0] + radius[0] * way) + POSE[:3, 3], size))
+    return union(whole.transform(POSE), union(*drops).material(DEW))
 
 
 def _skin(random: np.random.Generator) -> Shape:
@@ -99,7 +119,7 @@ def _skin(random: np.random.Generator) -> Shape:
         *strand(
             [(-3.05, 0.1, -0.1), (-2.2, 0.22, 0.0), (-1.0, 0.4, 0.04), (0.6, 0.42, 0.0), (1.7, 0.42, 0.02)],
             (0.05, 0.2, 0.42, 0.5, 0.42),
-            8,
+            7,
         ),
         *strand(
             [(1.2, 0.4, 0.02), (2.0, 0.62, 0.02), (2.42, 1.05, 0.04), (2.72, 1.35, 0.06)], (0.46, 0.43, 0.37, 0.33), 5
@@ -111,9 +131,10 @@ def _skin(random: np.random.Generator) -> Shape:
     skirt = []
     for side in (-1, 1):
         edge = curve(
-            [(-2.7, 0.05, side * 0.1), (-1.4, 0.05, side * 0.5), (0.3, 0.05, side * 0.68), (1.7, 0.05, side * 0.5)], 10
+            [(-2.9, 0.03, side * 0.1), (-1.4, 0.06, side * 0.56), (0.3, 0.06, side * 0.74), (1.9, 0.06, side * 0.5)], 20
         )
-        skirt += [egg(p, (0.3, 0.12, 0.2)) for p in edge]
+        wave = [0.09 + 0.05 * (k % 2) for k in range(len(edge))]
+        skirt += [limb(edge[k], edge[k + 1], wave[k], wave[k + 1]) for k in range(len(edge) - 1)]
     warts = []
     spine = curve([(0.95, 0.62, 0.02), (1.6, 0.68, 0.02), (2.1, 0.9, 0.03), (2.45, 1.2, 0.05)], 9)
     for i, p in enumerate(spine):
@@ -125,10 +146,10 @@ def _skin(random: np.random.Generator) -> Shape:
                     random.uniform(0.06, 0.1),
                 )
             )
-    body = union(*foot, smooth=0.22).material(SKIN)
+    body = union(*foot, smooth=0.16).material(SKIN)
     return union(
         body,
-        union(*skirt, smooth=0.08).material(FOOT),
+        union(*skirt).material(FOOT),
         union(*warts).material(PALE),
         union(*muzzle, smooth=0.05).material(PALE),
         smooth=0.09,
@@ -156,34 +177,34 @@ def _feeler(side: int) -> Shape:
     return union(*strand(path, (0.07, 0.045), 2), ball(path[-1], 0.06), smooth=0.03).material(PALE)
 
 
-def creature(random: np.random.Generator) -> Shape:
-    """The snail; parts ``left eye`` and ``right eye``."""
-    eyes = [_stalk(-1 if name == "left eye" else 1).at(*at).named(name) for name, at in EYES.items()]
+def _body(random: np.random.Generator) -> Shape:
+    """The snail without its shell and its eyes, which stand in collars."""
+    collars = [ball(at, 0.125).material(SKIN) for at in EYES.values()]
     smile = strand([(3.14, 1.12, 0.28), (3.24, 1.09, 0.07), (3.14, 1.14, -0.12)], (0.018, 0.022, 0.018), 3)
-    body = union(_skin(random), *eyes, _feeler(1), _feeler(-1), smooth=0.05)
-    drops = []
-    for turn, lift, size in (
-        (0.19, 0.7, 0.07),
-        (0.3, 1.0, 0.055),
-        (0.42, 0.5, 0.08),
-        (1.24, 0.9, 0.05),
-        (0.08, 0.8, 0.05),
-    ):
-        middle, radius, outward = whorl([turn])
-        way = math.cos(lift) * outward[0] + math.sin(lift) * np.array([0, 0, 1.0])
-        drops.append(ball(POSE[:3, :3] @ (middle[0] + radius[0] * way) + POSE[:3, 3], size))
-    return union(body, _shell(), union(*smile).material(EYE), union(*drops).material(DEW))
+    return union(union(_skin(random), *collars, _feeler(1), _feeler(-1), smooth=0.05), union(*smile).material(EYE))
+
+
+def creature(random: np.random.Generator) -> tuple[Implicit, ...]:
+    """The snail, in parts that move by themselves: so nothing is pruned again for them."""
+    eyes = (
+        Implicit(_stalk(-1 if name == "left eye" else 1).at(*EYES[name]), material=SKIN, name=name) for name in EYES
+    )
+    return (
+        Implicit(_body(random), material=SKIN, name="snail"),
+        Implicit(_shell(), material=BANDS[0], name="shell"),
+        *eyes,
+    )
 
 
 def motion(time: float) -> Mapping[str, ArrayLike]:
     """Matrices of the snail and its eyes at a time in seconds: it creeps to and fro, and looks around."""
     place = np.eye(4)
     place[0, 3] = 0.35 * math.sin(0.4 * time)
-    result: dict[str, ArrayLike] = {"snail": place}
+    result: dict[str, ArrayLike] = {"snail": place, "shell": place}
     for side, (name, at) in zip((-1, 1), EYES.items(), strict=True):
         sway = 9 * math.sin(1.3 * time + 0.7 * side) - 9 * math.sin(0.7 * side)
         nod = 8 * math.sin(0.9 * time + 1.1 * side) - 8 * math.sin(1.1 * side)
-        result[name] = about(at, spin(sway, 0, nod))
+        result[name] = place @ about(at, spin(sway, 0, nod))
     return result
 
 
@@ -201,37 +222,34 @@ def _stone(random: np.random.Generator) -> Shape:
         egg((5.2, -2.6, 1.8), (3.0, 2.2, 2.4), spin(0, 20, 8)),
         egg((-5.6, -2.8, 1.2), (3.2, 2.5, 2.6), spin(0, -20, -6)),
         egg((-3.0, -2.2, -4.2), (3.6, 2.6, 2.4)),
-        smooth=0.5,
+        smooth=0.4,
     ).material(STONE)
     moss: list[Shape] = []
     for k in range(64):
         x, z = random.uniform(-6.2, 6.2), random.uniform(-2.2, 3.9)
         size = random.uniform(0.3, 0.75)
-        high = _top(x, z)
-        if high < -2.2:
+        ground = _top(x, z)
+        if ground < -2.2:
             continue
-        clump = egg((x, high - 0.03, z), (size * 1.25, size * random.uniform(0.24, 0.4), size))
-        moss.append(clump.material(MOSS if k % 3 else MOSS_DARK))
-    return intersection(union(rock, union(*moss, smooth=0.14), smooth=0.08), box((18, 5, 13)).at(0, -1.5, 0))
+        high = size * random.uniform(0.24, 0.4)
+        radius = 0.5 * (size**2 / high + high)  # of a ball that stands out so far, so wide
+        moss.append(ball((x, ground - 0.03 + high - radius, z), radius).material(MOSS if k % 3 else MOSS_DARK))
+    return intersection(union(rock, union(*moss), smooth=0.07), box((18, 5, 13)).at(0, -1.5, 0))
 
 
 def _toadstool(at: Sequence[float], size: float, lean: float) -> Shape:
-    dome = egg((0, 1.0, 0), (0.62, 0.42, 0.62))
-    hollow = egg((0, 0.8, 0), (0.75, 0.22, 0.75))
+    cap = ball((0, 0.763, 0), 0.657).material(CAP) - ball((0, -1.78, 0), 2.78).material(GILLS)
     dots = []
     for k in range(9):
-        around, high = 2.4 * k, 0.35 + 0.6 * ((k * 0.618) % 1)
+        around, high = 2.4 * k, 0.45 + 0.52 * ((k * 0.618) % 1)
         flat = math.sqrt(1 - high * high)
-        dots.append(
-            egg((0.6 * flat * math.cos(around), 1.0 + 0.41 * high, 0.6 * flat * math.sin(around)), (0.085, 0.05, 0.085))
-        )
+        dots.append(ball((0.62 * flat * math.cos(around), 0.763 + 0.62 * high, 0.62 * flat * math.sin(around)), 0.08))
     stem = strand([(0, -0.3, 0), (0.05, 0.4, 0), (0, 0.95, 0)], (0.2, 0.14, 0.12), 3)
     ring = torus(0.14, 0.035).orient((0, 1, 0)).at(0.02, 0.66, 0)
     return (
         union(
-            (dome - hollow).material(CAP),
+            cap,
             union(*dots).material(CREAM),
-            egg((0, 0.93, 0), (0.5, 0.09, 0.5)).material(GILLS),
             union(*stem, ring, smooth=0.03).material(CREAM),
         )
         .transform(spin(0, 0, lean))
@@ -243,8 +261,8 @@ def _toadstool(at: Sequence[float], size: float, lean: float) -> Shape:
 def _fallen_leaf() -> Shape:
     """A pointed leaf, a little bent: what two balls have in common, with its veins."""
     blade = intersection(
-        egg((0, 0, 0.62), (1.75, 0.9, 1.25)),
-        egg((0, 0, -0.62), (1.75, 0.9, 1.25)),
+        ball((0, 0, 1.52), 2.15),
+        ball((0, 0, -1.52), 2.15),
         ball((0, -4.0, 0), 4.06),
     ) - ball((0, -4.0, 0), 4.0)
     ribs = strand(
@@ -274,9 +292,7 @@ def _grass(random: np.random.Generator) -> Shape:
             foot + [0, 0.9 * tall, 0] + 0.6 * lean * way,
             foot + [0, tall, 0] + 1.1 * lean * way,
         ]
-        blades.append(
-            union(*strand(path, (0.075, 0.065, 0.05, 0.012), 5), smooth=0.02).material((GREEN, GREEN_DARK)[k % 2])
-        )
+        blades.append(union(*strand(path, (0.075, 0.065, 0.05, 0.012), 5)).material((GREEN, GREEN_DARK)[k % 2]))
     return union(*blades)
 
 
@@ -319,12 +335,12 @@ def _garden(random: np.random.Generator) -> Shape:
 
 
 def _distance(random: np.random.Generator) -> Shape:
-    """Discs of light far behind, as a lens out of focus makes them."""
+    """Balls of light far behind: discs, as a lens out of focus makes them."""
     discs = []
     for k in range(18):
         x, y = random.uniform(-19, 19), random.uniform(-5, 12)
         size = random.uniform(0.7, 1.9)
-        discs.append(egg((x, y, -26 + random.uniform(-2, 2)), (size, size, 0.2)).material(GLOW[k % len(GLOW)]))
+        discs.append(ball((x, y, -26 + random.uniform(-2, 2)), size).material(GLOW[k % len(GLOW)]))
     return union(*discs)
 
 
@@ -342,7 +358,7 @@ def snail(*, lights: int = 1, seed: int = 0) -> Scene:
     random = np.random.default_rng(options.seed)
     return Scene(
         implicits=(
-            Implicit(creature(random), material=SKIN, name="snail"),
+            *creature(random),
             Implicit(_stone(random), material=STONE, name="stone"),
             Implicit(_garden(random), material=GREEN, name="garden"),
             Implicit(nearer(_distance(random), VIEWER, 0.55), material=GLOW[0], name="distance"),

@@ -30,6 +30,7 @@ class RayTracedAo(Technique):
     paper: ClassVar[str] = "Zhukov 1998, An ambient light illumination model; Landis 2002"
     casts_rays: ClassVar[bool] = True
     advice: ClassVar[str] = "Corners and contacts darken as under a grey sky; noisy for some frames after each change."
+    reads_motion: ClassVar[bool] = True
 
     radius: float = param(1.0, 1e-6, None, "distance within which surfaces block the ambient light", unit="m")
     samples: int = param(1, 1, 256, "rays a pixel and frame")

@@ -46,6 +46,7 @@ class RayTraced(Technique):
     paper: ClassVar[str] = "Appel 1968, Some techniques for shading machine renderings of solids; Cook 1984 (soft)"
     casts_rays: ClassVar[bool] = True
     advice: ClassVar[str] = "Exact for any light, scene and scale, and soft where a light has a size; costs rays."
+    reads_motion: ClassVar[bool] = True
 
     samples: int = param(1, 1, 256, "rays a pixel, frame and light with a size")
     fresh: int = param(8, 1, 64, "times as many rays, to 64, where a soft shadow remembers nothing")
