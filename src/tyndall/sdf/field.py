@@ -772,7 +772,6 @@ class Field(Closing):
 
     def _edit(self, made: _Object, parts: _Parts, changes: Mapping[str, Any], shapes: Sequence[Any]) -> None:
         """Write the numbers of the primitives of a name."""
-        name = parts.name
         for index, slot, shape in zip(parts.leaves.tolist(), parts.slots.tolist(), shapes, strict=True):
             leaf = made.program.leaves[index]
             made.program.leaves[index] = dataclasses.replace(leaf, shape=shape)
