@@ -558,8 +558,7 @@ class Field(Closing):
             self._before_buffer = self._buffer("slots_before", self._slot_buffer.size_bytes, "vec4f")
         elif self._is_remembered:
             return
-        size = self._slot_buffer.size_bytes
-        self._gpu.encoder.copy_buffer_to_buffer(self._slot_buffer.native, 0, self._before_buffer.native, 0, size)
+        self._gpu.copy_buffer(self._slot_buffer, self._before_buffer)
         self._is_remembered = self._is_known = True
 
     @property
