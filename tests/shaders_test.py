@@ -104,14 +104,20 @@ def test_every_entry_point_compiles_and_is_used(gpu: Gpu, monkeypatch: pytest.Mo
     solid = Scene(SHAPES[:2], LIGHTS[:1], props.AHEAD)  # maps of what has holes are not drawn in compute
     with Renderer(solid, (8, 6), gpu=gpu, shadow=ShadowMap(size=64, rasterizer="compute")) as renderer:
         renderer.draw()
-    monkeypatch.setattr("tyndall.sdf.field._LONG", 8)  # so that a short program's leaves are sorted out as well
+    for limit in ("_LONG", "_SPLIT"):  # so that a short program's leaves are sorted out, and its cells split, as well
+        monkeypatch.setattr(f"tyndall.sdf.field.{limit}", 8)
     short, long = (union(*[sphere(0.1).at(0.2 * i) for i in range(n)], smooth=0.1) for n in (6, 9))
+    short = (short | sphere(0.1).at(0, 0.3).named("part")) - sphere(0.05)  # no union
     surface = Material(emissive=(1, 1, 1), reflections=True)
     surfaces = [Implicit(shape, _mirror, surface) for shape in (short, long)]
     cloud = Volume(sphere(0.5), Medium(0.1))
     fields = Scene(SHAPES[:1], LIGHTS[:1], props.AHEAD, Medium(0.1), implicits=surfaces, volumes=[cloud])
     with Renderer(fields, (8, 6), gpu=gpu, shadow=ShadowMap(size=16)) as renderer:
-        renderer.draw()  # reflections and clouds are drawn unless told otherwise, and compiled for each kind of shadow
+        for _ in range(
+            3
+        ):  # reflections and clouds are drawn unless told otherwise, and compiled for each kind of shadow
+            renderer.draw()
+            renderer.move("part", np.eye(4))
         for family in ("reflection", "volume"):
             renderer.use(family, "none")
         renderer.use("occlusion", "field_ao")
