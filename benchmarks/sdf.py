@@ -18,12 +18,14 @@ import json
 import os
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import peer_shadertoy
 
 from tyndall.gpu.device import Gpu
+from tyndall.gpu.params import nearest
 from tyndall.lab import bench_sdf
 from tyndall.lab.bench_sdf import SdfBench
 
@@ -34,24 +36,30 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, help="of each measurement of our frames")
     parser.add_argument("--loop-seconds", type=float, help="of each measurement of the plain loop")
     parser.add_argument("--timeout", type=float, help="seconds after which a compiler is ended")
-    parser.add_argument("--parts", help=f"some of {','.join(bench_sdf.PARTS)}")
-    parser.add_argument("--scenes", help="names, comma-separated")
-    parser.add_argument("--swarm", help="numbers of primitives, comma-separated")
-    parser.add_argument("--size", help="WxH")
+    parser.add_argument("--parts", type=names, help=f"some of {','.join(bench_sdf.PARTS)}")
+    parser.add_argument("--scenes", type=names, help="names, comma-separated")
+    parser.add_argument("--swarm", type=numbers(","), help="numbers of primitives, comma-separated")
+    parser.add_argument("--size", type=numbers("x"), help="WxH")
     parser.add_argument("--peer", choices=("too", "only", "none"), default="too")
     parser.add_argument("--out", type=Path, default=os.environ.get("OUT"))
     parser.add_argument("--join", type=Path, nargs="+", help="documents of some parts each")
     chosen = parser.parse_args()
     if chosen.join:
-        read = [json.loads(path.read_text(encoding="utf-8")) for path in chosen.join]
-        keep(bench_sdf.join(read), chosen.out)
+        try:
+            joined = bench_sdf.join([json.loads(path.read_text(encoding="utf-8")) for path in chosen.join])
+        except (OSError, ValueError) as error:  # a ParameterError is one
+            parser.error(f"--join: {error}")
+        keep(joined, chosen.out)
         return
+    unknown = [part for part in chosen.parts or () if part not in bench_sdf.PARTS]
+    if unknown:
+        parser.error(f"--parts: no '{unknown[0]}'{nearest(unknown[0], bench_sdf.PARTS)}")
     base = bench_sdf.QUICK if chosen.quick else bench_sdf.Settings()
     changes: dict[str, object] = {
-        "parts": () if chosen.peer == "only" else tuple(chosen.parts.split(",")) if chosen.parts else None,
-        "scenes": tuple(chosen.scenes.split(",")) if chosen.scenes else None,
-        "swarm": tuple(int(count) for count in chosen.swarm.split(",")) if chosen.swarm else None,
-        "size": tuple(int(side) for side in chosen.size.split("x")) if chosen.size else None,
+        "parts": () if chosen.peer == "only" else chosen.parts,
+        "scenes": chosen.scenes,
+        "swarm": chosen.swarm,
+        "size": chosen.size,
         "seconds": chosen.seconds,
         "loop_seconds": chosen.loop_seconds or (min(chosen.seconds, base.loop_seconds) if chosen.seconds else None),
         "timeout": chosen.timeout,
@@ -66,9 +74,9 @@ def main() -> None:
         found = bench_sdf.sdf(gpu, chosen.out, settings=settings, progress=tell)
     document = found.to_json()
     if chosen.peer != "none":
-        names = [*settings.scenes, *(f"swarm:{count}" for count in settings.swarm if count <= 1000)]
+        scenes = [*settings.scenes, *(f"swarm:{count}" for count in settings.swarm if count <= 1000)]
         document["peer"] = peer_shadertoy.measure_apart(
-            names,
+            scenes,
             settings.size,
             seconds=settings.loop_seconds,
             timeout=settings.timeout,
@@ -76,6 +84,20 @@ def main() -> None:
         )
     document["seconds"] = round(time.monotonic() - begin, 1)
     keep(document, chosen.out)
+
+
+def names(text: str) -> tuple[str, ...]:
+    """Of a list with commas."""
+    return tuple(text.split(","))
+
+
+def numbers(between: str) -> Callable[[str], tuple[int, ...]]:
+    """Of a list with something between them."""
+
+    def whole_numbers(text: str) -> tuple[int, ...]:
+        return tuple(int(number) for number in text.split(between))
+
+    return whole_numbers
 
 
 def keep(document: dict[str, Any], out: Path | None) -> None:

@@ -10,7 +10,9 @@ import pytest
 import tyndall
 from tyndall import sdf
 
-PAGE = (Path(__file__).parents[1] / "docs" / "implicit-surfaces.md").read_text(encoding="utf-8")
+ROOT = Path(__file__).parents[1]
+PAGE = (ROOT / "docs" / "implicit-surfaces.md").read_text(encoding="utf-8")
+README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 
 def test_the_guide_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -25,6 +27,15 @@ def test_the_guide_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
     text = "\n".join(drawn.sub("", block) for block in blocks)
     exec(compile(text, "implicit-surfaces.md", "exec"), names)
     assert (tmp_path / "slice.png").stat().st_size > 0
+
+
+def test_the_readme_models_and_draws(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As printed, but for the pictures' size and number, and one of the two renderers."""
+    monkeypatch.chdir(tmp_path)
+    text = re.findall(r"```python\n(.*?)```", README, re.DOTALL)[1]
+    text = re.sub(r"^ty\.render\(.*", "", text, flags=re.MULTILINE)
+    exec(compile(text.replace("(640, 360)", "(16, 9)").replace("range(30)", "range(2)"), "README.md", "exec"), {})
+    assert {path.name for path in tmp_path.iterdir()} == {"part.json", "slice.png"}
 
 
 def test_the_guide_names_every_shape_and_method() -> None:

@@ -661,7 +661,8 @@ class Renderer(Closing):
                 self._setup(techniques)
                 for frame in range(2):  # the first has no past, so it may have other shaders
                     self._frame, self._history = frame, frame
-                    self._record(camera, jitter=True, casters=True)
+                    with self.gpu.together():
+                        self._record(camera, jitter=True, casters=True)
                     self._discard()
             except BaseException:
                 self.close()

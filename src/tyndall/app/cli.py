@@ -35,7 +35,7 @@ DONE, FAULT, MISTAKE, INTERRUPTED = 0, 1, 2, 130
 
 app = typer.Typer(
     name="tyndall",
-    help="Volumetric light and shadow techniques side by side, with honest numbers.",
+    help="Volumetric light, shadows and implicit surfaces: techniques side by side, with honest numbers.",
     epilog="Every parameter of every technique is a flag: --froxel.grid 190,90,128. `tyndall techniques` lists them.",
     rich_markup_mode="rich",
     add_completion=False,

@@ -28,7 +28,7 @@ from tyndall.scene.model import (
     Scene,
     SpotLight,
 )
-from tyndall.sdf import sphere, union
+from tyndall.sdf import box, sphere, union
 from tyndall.techniques import FAMILIES
 from tyndall.techniques.shadow.shadow_map import ShadowMap
 from tyndall.techniques.volumetric.march import March
@@ -354,6 +354,53 @@ def test_an_objects_motion_is_told_from_that_of_the_camera(gpu: Gpu) -> None:
         step = place[:2] / -place[2] - before[:2] / -before[2]
         np.testing.assert_allclose(row, step / (height * 64 / 48, -height), atol=0.004)
     np.testing.assert_array_equal(moved[2], 0)
+    np.testing.assert_array_equal(still, 0)
+
+
+def test_the_motion_of_parts_is_told_from_that_of_their_object(gpu: Gpu) -> None:
+    """A leaf is turned, several leaves are moved, and what is mirrored moves the other way; then all stand still."""
+    several = union(box(0.4), sphere(0.25)).named("several").at(0, 0.6)
+    shape = union(sphere(0.3).named("leaf"), several, sphere(0.2).at(0.8).named("twin").mirror("x"))
+    scene = Scene(camera=props.AHEAD, implicits=[Implicit(shape, at(0, 0, -3.0), WHITE, "all")])
+    spin = np.array([[0, -1, 0, 0.05], [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1.0]])
+    moves = {"leaf": spin, "several": at(0, 0.1, 0), "twin": at(0.06, 0, 0), "all": at(0.02, 0, 0)}
+    plain = {**QUIET, "antialiasing": "taa"}
+    with Renderer(scene, (64, 48), gpu=gpu, **plain) as renderer:
+        renderer.draw(jitter=False)
+        for name, matrix in moves.items():
+            renderer.move(name, matrix)
+        renderer.draw(jitter=False)
+        assert renderer._fields is not None
+        assert renderer._fields._flow is not None
+        ways = gpu.read_texture(renderer._fields._flow)[..., :3].astype(float)
+        depth = renderer.depth()
+        pixels = np.array([(34, 20, 0, 0)], np.float32)
+        seen = props.evaluate(gpu, "motion_parts", _MOTION, pixels, renderer._scope)[0, :2]
+        renderer.draw(jitter=False)
+        still = props.evaluate(gpu, "motion_parts_still", _MOTION, pixels, renderer._scope)[0, :2]
+    directions = props.rays(props.AHEAD, (64, 48)).directions
+    places = directions / -directions[..., 2:] * depth[..., None]
+    x, y = places[..., 0], places[..., 1]
+    with np.errstate(invalid="ignore"):
+        found = np.isfinite(depth)
+        masks = {
+            "leaf": found & (np.hypot(x - 0.07, y) < 0.3),
+            "several": found & (y > 0.45),
+            "right": found & (x > 0.6),
+            "left": found & (x < -0.6),
+        }
+    assert all(mask.sum() > 20 for mask in masks.values())
+    for name, way in (("several", (-0.02, -0.1, 0)), ("right", (-0.08, 0, 0)), ("left", (0.04, 0, 0))):
+        np.testing.assert_allclose(ways[masks[name]], np.broadcast_to(way, ways[masks[name]].shape), atol=1e-3)
+    here = places[masks["leaf"]]
+    local = here - (0.02, 0, -3)
+    before = np.stack([local[:, 1], 0.05 - local[:, 0], local[:, 2]], -1) + (0, 0, -3)
+    np.testing.assert_allclose(ways[masks["leaf"]], before - here, atol=2e-3)
+    p = places[20, 34]
+    then = p + ways[20, 34]
+    height = 2 * math.tan(props.AHEAD.fov / 2)
+    step = p[:2] / -p[2] - then[:2] / -then[2]
+    np.testing.assert_allclose(seen, step / (height * 64 / 48, -height), atol=2e-3)
     np.testing.assert_array_equal(still, 0)
 
 

@@ -473,6 +473,11 @@ class Gpu(Closing):
         """
         self._record(lambda: self.encoder.clear_buffer(buffer.native, offset, size))
 
+    def copy_buffer(self, source: Buffer, target: Buffer) -> None:
+        """Copy all of a buffer into another of its size, between the passes recorded before and after."""
+        size = source.size_bytes
+        self._record(lambda: self.encoder.copy_buffer_to_buffer(source.native, 0, target.native, 0, size))
+
     def dtype(self, struct: str) -> np.dtype[Any]:
         """The numpy layout of a WESL struct, by its path."""
         return self.linker.dtype(struct)

@@ -58,6 +58,7 @@ from tyndall.sdf.field import Field
 
 NAME = "sdf"
 PARTS = ("scenes", "swarm", "edits", "first", "agreement", "loops")
+_ROWS = ("scenes", "swarm", "first", "agreement")  # what a document has by scenes
 FRAME: Mapping[str, str] = {
     "volumetric": "off",
     "shadow": "field",
@@ -172,26 +173,49 @@ def sdf(
 
 
 def join(documents: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Documents of several runs on one adapter, each of some parts, as one; of what several have, the last one's.
+    """Documents of several runs on one adapter, each of some parts or scenes, as one; of what several have, the last
+    one's. ``runs`` then says what each of them measured, and how.
 
     Raises:
-        ParameterError: none, or of several adapters.
+        ParameterError: none, of another benchmark, of several adapters, or of pictures of several sizes.
     """
+    if not documents or any(document.get("benchmark") != NAME for document in documents):
+        raise ParameterError(f"documents: not all of this benchmark, '{NAME}'")
     if len({document["adapter"] for document in documents}) != 1:
         raise ParameterError("documents: not of one adapter")
+    if len({tuple(document["settings"]["size"]) for document in documents}) != 1:
+        raise ParameterError("documents: not of pictures of one size")
+    runs = [run for document in documents for run in document.get("runs", [_run(document)])]
     joined: dict[str, Any] = {}
     for document in documents:
         for key, value in document.items():
-            if key in ("scenes", "swarm") and key in joined:
-                rows = {row["scene"]: row for row in joined[key]}
+            if key in _ROWS:
+                rows = {row["scene"]: row for row in joined.get(key, [])}
                 for row in value:
-                    rows[row["scene"]] = {**rows.get(row["scene"], {}), **row}
-                joined[key] = list(rows.values())
-            elif key == "failed":
-                joined[key] = [*joined.get(key, []), *value]
-            else:
+                    both = key in ("scenes", "swarm") and row["scene"] in rows
+                    rows[row["scene"]] = _joined_row(rows[row["scene"]], row) if both else row
+                joined[key] = sorted(rows.values(), key=lambda row: row.get("count", 0))
+            elif key != "failed":
                 joined[key] = value
-    return joined
+    joined["runs"] = sorted(runs, key=lambda run: str(run["date"]))
+    failed = [{"what": what, "reason": reason} for what, reason in tables.failures(joined)]
+    return {**joined, "failed": failed} if failed else joined
+
+
+def _joined_row(first: Row, last: Row) -> Row:
+    """A row of two runs: figures of ours are of one of them; of the plain loop, each way is."""
+    if len({row["scene_hash"] for row in (first, last) if "scene_hash" in row}) > 1:
+        return last  # another scene by now: its figures cannot stand beside the old ones
+    ways: Row = {kind: {**first[kind], **last[kind]} for kind in ("loop", "listed") if kind in first and kind in last}
+    return {**first, **last, **ways}
+
+
+def _run(document: Mapping[str, Any]) -> Row:
+    """What a document says of its run."""
+    return {
+        **{key: document[key] for key in ("date", "versions", "settings")},
+        "parts": tables.parts_of(document),
+    }
 
 
 class _Moving:
@@ -440,6 +464,7 @@ class _Run:
             )
             scene = self._tried(name, partial(self._scene, name))
             if scene is None:
+                rows.append({"scene": name, "failed": self._reason})
                 continue
             row: Row = {"scene": name, **facts(scene)}
             rows.append(row)

@@ -435,6 +435,10 @@ class Implicit:
     def __post_init__(self) -> None:
         if getattr(self.shape, "dimension", None) != 3:
             raise ParameterError(f"shape: {type(self.shape).__name__} is no solid shape; extrude or revolve a flat one")
+        if not isinstance(self.material, Material):
+            raise ParameterError(f"material: {self.material!r} is no Material")
+        if not isinstance(self.name, str):
+            raise ParameterError(f"name: {self.name!r} is no name")
         rows = tuple(tuple(float(x) for x in row) for row in placement(self.transform))
         object.__setattr__(self, "transform", rows)
 
@@ -479,6 +483,8 @@ class Volume:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "transform", self.surface.transform)
+        if not isinstance(self.medium, Medium):
+            raise ParameterError(f"medium: {self.medium!r} is no Medium")
         if self.surface.bounds is None:
             raise ParameterError("shape: it has no end; a volume must")
         if not 0 <= self.edge < math.inf:

@@ -1,4 +1,4 @@
-"""A stage for what comes without one: camera, ground, light and air around the contents of a mesh file.
+"""A stage for what comes without one: camera, ground, light and air around a mesh file, a mesh or a shape.
 
 Everything is in proportion to the object's radius r, half the diagonal of its bounding box, so that a bunny of 15 cm
 and a part of 80 "metres" (an STL in millimetres) give the same picture:
@@ -27,11 +27,13 @@ from numpy.typing import NDArray
 from tyndall.scene.model import (
     Camera,
     HenyeyGreenstein,
+    Implicit,
     Instance,
     Material,
     Medium,
     Mesh,
     Scene,
+    Solid,
     SpotLight,
     Vec3,
     box_corners,
@@ -56,11 +58,18 @@ _MOST_POINTS = 10_000  # vertices that framing looks at
 Points = NDArray[np.float64]
 
 
-def stage(scene: Scene) -> Scene:
+def stage(scene: Scene | Mesh | Solid) -> Scene:
     """The scene with what it lacks: a camera (and then a ground), a light, a medium. See the module's description.
 
-    A camera or medium equal to the default counts as lacking.
+    A camera or medium equal to the default counts as lacking. A mesh or a solid shape becomes a scene of its own.
+
+    Raises:
+        ParameterError: a flat shape, or something else.
     """
+    if isinstance(scene, Mesh):
+        scene = Scene(instances=(Instance(scene),))
+    elif not isinstance(scene, Scene):
+        scene = Scene(implicits=(Implicit(scene),))
     low, high = scene.bounds
     centre = (low + high) / 2
     radius = float(np.linalg.norm(high - low)) / 2

@@ -11,6 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 import tyndall.scene
+from tyndall.gpu.params import ParameterError
 from tyndall.scene.files import load
 from tyndall.scene.model import Camera, DirectionalLight, Instance, Medium, Mesh, PointLight, Scene, SpotLight
 from tyndall.scene.stage import FILL, OPTICAL_DEPTH, RADIANCE, WIDEST, stage
@@ -143,3 +144,29 @@ def test_real_files_are_framed(name: str) -> None:
     scene = load(path)
     picture = project(stage(scene).camera, scene.instances[0].mesh.positions)
     assert (picture[:, 1].max() - picture[:, 1].min()) / 2 == pytest.approx(FILL, abs=0.06)
+
+
+def test_a_mesh_or_a_shape_alone_stands_on_a_stage_too() -> None:
+    (instance,) = ellipsoid(1, 2, 1).instances
+    assert stage(instance.mesh).instances[0].mesh is instance.mesh
+    scene = stage(Ball())
+    assert scene.implicits[0].shape == Ball()
+    assert len(scene.lights) == len(scene.instances) == 1
+    with pytest.raises(ParameterError, match="str is no solid shape"):
+        stage("box")  # type: ignore[arg-type]
+
+
+class Ball:
+    """As much as a scene must know of a shape."""
+
+    dimension = 3
+    box = (np.full(3, -1.0), np.full(3, 1.0))
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Ball)
+
+    def __hash__(self) -> int:
+        return 0
+
+    def moved(self, moves: Any) -> Ball:
+        return self

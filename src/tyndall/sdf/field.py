@@ -228,6 +228,7 @@ class _Object:
     turned: set[str] = dataclasses.field(default_factory=set)  # names of parts that are
     moved: bool = False  # since the box was fitted
     hull: Hull | None = None
+    sizes: Floats | None = None  # (leaves,) ≤ 1, powers of two: how much smaller than at rest leaves may be
     has_hull: bool = False  # was looked for
     jobs: list[Any] | None = None
     halves: Floats | None = None  # (3, leaves) of the leaves' boxes in their own spaces, and their middles
@@ -242,6 +243,7 @@ class _Object:
         self.linear = placements[:, :3, :3].copy()  # of the leaves, and (3, leaves) where they are
         self.places = np.ascontiguousarray(placements[:, :3, 3].T)
         self.is_straight = bool((self.linear == np.eye(3)).all())
+        self.leaf_slots = np.array([leaf.slot for leaf in self.program.leaves])
 
     def together(self, sets: Sequence[_Parts]) -> _Parts:
         """:meth:`_Parts.joined`, once for all frames."""
@@ -260,7 +262,9 @@ class _Object:
 
     def leaves(self) -> list[tuple[Leaf, float]]:
         """The leaves, each with what its values are multiplied by."""
-        return [(leaf, float(self.program.slots[leaf.slot, 3])) for leaf in self.program.leaves]
+        sizes = np.ones(len(self.program.leaves)) if self.sizes is None else self.sizes
+        factors = (float(self.program.slots[leaf.slot, 3]) for leaf in self.program.leaves)
+        return [(leaf, factor * size) for leaf, factor, size in zip(self.program.leaves, factors, sizes, strict=True)]
 
     @property
     def shape(self) -> Shape:
@@ -554,8 +558,7 @@ class Field(Closing):
             self._before_buffer = self._buffer("slots_before", self._slot_buffer.size_bytes, "vec4f")
         elif self._is_remembered:
             return
-        size = self._slot_buffer.size_bytes
-        self._gpu.encoder.copy_buffer_to_buffer(self._slot_buffer.native, 0, self._before_buffer.native, 0, size)
+        self._gpu.copy_buffer(self._slot_buffer, self._before_buffer)
         self._is_remembered = self._is_known = True
 
     @property
@@ -713,6 +716,8 @@ class Field(Closing):
     def _fit(self, made: _Object) -> None:
         """Let the object's box hold it where its parts are now; its cells stay as they are while they do."""
         made.moved = False
+        if made.program.sag >= 0 and (made.turned or made.sizes is not None):
+            self._shrink(made)
         box = self._hull(made) if made.program.sag >= 0 else None
         if box is None:
             if not made.has_hull:
@@ -731,6 +736,14 @@ class Field(Closing):
         upper = np.where(high > made.box[1], high + spare, made.box[1])
         made.box = lower, upper
         self._describe(self._objects.index(made))
+
+    def _shrink(self, made: _Object) -> None:
+        """Take note of leaves that motion makes smaller: what a smooth union adds to them is not, and so is more of
+        their own boxes."""
+        stretch = self._slots[made.first_slot + 1 + made.leaf_slots, 3] / made.program.slots[made.leaf_slots, 3]
+        sizes = np.exp2(np.floor(np.log2(np.minimum(stretch, 1.0)) + 1e-3))
+        if made.sizes is None or not np.array_equal(sizes, made.sizes):
+            made.sizes, made.halves = sizes, None
 
     def _hull(self, made: _Object) -> Box:
         """The box of all leaves, where nothing but unions is above them."""
@@ -751,21 +764,15 @@ class Field(Closing):
         Raises:
             ParameterError: no such name, a part that is no primitive, or a value that it does not allow.
         """
-        for made, parts in self._parts(name):
-            self._edit(made, parts, changes)
+        sets = self._parts(name)
+        changed = [self._changed(made, parts, changes) for made, parts in sets]  # all are right, or none is edited
+        for (made, parts), shapes in zip(sets, changed, strict=True):
+            self._edit(made, parts, changes, shapes)
 
-    def _edit(self, made: _Object, parts: _Parts, changes: Mapping[str, Any]) -> None:
-        name = parts.name
-        if (parts.leaves < 0).any():
-            raise ParameterError(f"{name}: is more than one primitive, and has no parameters")
-        for index, slot in zip(parts.leaves.tolist(), parts.slots.tolist(), strict=True):
+    def _edit(self, made: _Object, parts: _Parts, changes: Mapping[str, Any], shapes: Sequence[Any]) -> None:
+        """Write the numbers of the primitives of a name."""
+        for index, slot, shape in zip(parts.leaves.tolist(), parts.slots.tolist(), shapes, strict=True):
             leaf = made.program.leaves[index]
-            unknown = [key for key in changes if key not in {f.name for f in dataclasses.fields(leaf.shape)}]
-            if unknown:
-                raise ParameterError(f"{name}: a {type(leaf.shape).__name__} has no {unknown[0]}")
-            shape: Any = dataclasses.replace(leaf.shape, **changes)
-            if getattr(shape, "payload", None) is not None or shape.lipschitz > leaf.shape.lipschitz * (1 + 1e-9):
-                raise ParameterError(f"{name}: a {type(shape).__name__} with samples or a greater bound is a new shape")
             made.program.leaves[index] = dataclasses.replace(leaf, shape=shape)
             numbers = np.zeros(8, np.float32)
             numbers[: len(shape.numbers)] = shape.numbers
@@ -774,9 +781,9 @@ class Field(Closing):
             self._slots[at + 3, 1] *= shape.lipschitz / leaf.shape.lipschitz
             self._write(self._slot_buffer, self._slots[at + 1 : at + 4], 16 * (at + 1))
         made.halves = None
-        made.edits.setdefault(name, {}).update(changes)
+        made.edits.setdefault(parts.name, {}).update(changes)
         if made.program.sag < 0:  # its box is that of the whole expression
-            edited = made.shape.edited(name, changes)
+            edited = made.shape.edited(parts.name, changes)
             made.implicit, made.has_hull = dataclasses.replace(made.implicit, shape=edited), False
         made.dirty = made.moved = True
 
@@ -793,9 +800,35 @@ class Field(Closing):
             if made.at_rest is not other.at_rest:
                 continue
             for name, changes in other.edits.items():
-                self._edit(made, made.parts_of(name), changes)
+                parts = made.parts_of(name)
+                self._edit(made, parts, changes, self._changed(made, parts, changes))
             if other.moves:
                 self._move(made, [(made.parts_of(name), given) for name, given in other.moves.items()])
+
+    def _changed(self, made: _Object, parts: _Parts, changes: Mapping[str, Any]) -> list[Any]:
+        """The primitives of a name with other parameters.
+
+        Raises:
+            ParameterError: they are not to be had.
+        """
+        name = parts.name
+        if (parts.leaves < 0).any():
+            raise ParameterError(f"{name}: is more than one primitive, and has no parameters")
+        shapes = []
+        for index in parts.leaves.tolist():
+            leaf = made.program.leaves[index]
+            known = [f.name for f in dataclasses.fields(leaf.shape)]
+            for key in changes:
+                if key not in known:
+                    raise ParameterError(f"{name}: a {type(leaf.shape).__name__} has no {key}{nearest(key, known)}")
+            try:
+                shape: Any = dataclasses.replace(leaf.shape, **changes)
+            except ParameterError as error:
+                raise ParameterError(f"{name}: {error}") from None
+            if getattr(shape, "payload", None) is not None or shape.lipschitz > leaf.shape.lipschitz * (1 + 1e-9):
+                raise ParameterError(f"{name}: a {type(shape).__name__} with samples or a greater bound is a new shape")
+            shapes.append(shape)
+        return shapes
 
     def _jobs(self, index: int) -> list[Any]:
         """The divisions of an object, the coarse one first, each in as many parts as the marks take."""

@@ -272,6 +272,34 @@ def test_a_flat_part_is_moved_within_its_plane(gpu: Gpu) -> None:
                 field.move("flat", np.stack([np.eye(4), out]))
 
 
+@pytest.mark.parametrize("size", [0.5, 0.2, 0.05])
+def test_a_part_that_shrinks_has_room_for_what_melts(gpu: Gpu, size: float) -> None:
+    """What a smooth union adds does not shrink with the part."""
+    shape = union(sphere(0.2), sphere(0.2).named("drop"), smooth=1.0)
+    move = np.diag([size, size, size, 1.0])[None].copy()
+    move[0, 0, 3] = 0.45
+    with Field(gpu, [Implicit(shape)]) as field:
+        for given in (move, np.eye(4)[None], move):
+            field.move("drop", given)
+            field.update()
+            points = np.random.default_rng(3).uniform(-1, 1, (50_000, 3))
+            inside = points[shape.moved({"drop": iter(given)})(points) <= 0]
+            low, high = field._objects[0].box
+            assert (inside >= low).all()
+            assert (inside <= high).all()
+
+
+def test_an_edit_that_is_wrong_for_one_part_changes_none(gpu: Gpu) -> None:
+    shape = union(sphere(0.5).named("part"), box(0.5).at(1).named("part"))
+    with Field(gpu, [Implicit(shape)]) as field:
+        with pytest.raises(ParameterError, match="part: a Cuboid has no radius"):
+            field.edit("part", radius=0.2)
+        agree(gpu, field, 0, shape, 1000)
+    near = pytest.raises(ParameterError, match="did you mean 'size'")
+    with Field(gpu, [Implicit(box(0.5).named("part"))]) as field, near:
+        field.edit("part", sizes=0.2)
+
+
 def test_an_edited_part_below_other_than_unions_has_room(gpu: Gpu) -> None:
     def made(radius: float) -> Shape:
         return subtraction(sphere(radius).named("ball"), *(box(0.1).at(*at) for at in np.eye(3)), box(0.2))

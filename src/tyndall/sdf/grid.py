@@ -187,6 +187,8 @@ def from_mesh(mesh: Mesh, resolution: int = 64, *, margin: int = 2) -> Grid:
     Raises:
         ParameterError: a mesh that is not closed or encloses nothing, or a number out of range.
     """
+    if not isinstance(mesh, Mesh):
+        raise ParameterError(f"mesh: {mesh!r} is no Mesh; tyndall.load(file).instances have some")
     for name, value, least, most in (("resolution", resolution, 4, 256), ("margin", margin, 1, 64)):
         if not least <= value <= most:
             raise ParameterError(f"{name}: {value} is outside {least} … {most}")

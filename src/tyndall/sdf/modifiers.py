@@ -27,6 +27,12 @@ def weakest(accuracy: Accuracy, *, outside: bool = True) -> Accuracy:
     return "outside" if outside and accuracy != "bound" else "bound"
 
 
+def at_a_wall(accuracy: Accuracy, room: float) -> Accuracy:
+    """What is left of it by a mirror, or the axis of a turn, that is ``room`` away from the shape: where they touch,
+    what was a surface is none any more, and where they cross, what is left of it may be farther away."""
+    return accuracy if room > 0 else weakest(accuracy, outside=room == 0)
+
+
 # --- from flat to solid ---
 
 
@@ -80,7 +86,7 @@ class Revolve(Modifier):
 
     @cached_property
     def accuracy(self) -> Accuracy:
-        return self.shape.accuracy if self.shape.box[0][0] >= -self.offset else "bound"
+        return at_a_wall(self.shape.accuracy, float(self.shape.box[0][0]) + self.offset)
 
 
 # --- the value ---
@@ -271,7 +277,7 @@ class Mirror(Modifier):
 
     @cached_property
     def accuracy(self) -> Accuracy:
-        return self.shape.accuracy if (self.shape.box[0][list(self.axes)] >= 0).all() else "bound"
+        return at_a_wall(self.shape.accuracy, float(self.shape.box[0][list(self.axes)].min()))
 
 
 def mirror(shape: Shape, axes: str) -> Mirror:

@@ -548,20 +548,38 @@ class Horseshoe(Profile):
         x, y = np.abs(p[:, 0]), p[:, 1]
         along, across = x * c - y * s, x * s + y * c
         leg = np.stack([along - self.legs, np.abs(across - self.radius) - 0.5 * self.width], axis=1)
-        ring = np.abs(np.hypot(x, y) - self.radius) - 0.5 * self.width
+        # Inside of the ring the leg's end may be nearer than a wall.
+        ring = np.maximum(np.abs(np.hypot(x, y) - self.radius) - 0.5 * self.width, along - self.legs)
         return np.where(along > 0, rectangle_distance(leg), ring)
 
     @property
-    def corners(self) -> Box:
+    def _ends(self) -> Floats:
+        """(4, 2): the corners of the leg on the right, in order."""
         s, c = math.sin(self.angle), math.cos(self.angle)
         outer = self.radius + 0.5 * self.width
-        ends = np.array([[r * s + u * c, r * c - u * s] for r in (outer, outer - self.width) for u in (0, self.legs)])
+        inner = outer - self.width
+        around = ((outer, 0.0), (outer, self.legs), (inner, self.legs), (inner, 0.0))
+        return np.array([[r * s + u * c, r * c - u * s] for r, u in around])
+
+    @property
+    def corners(self) -> Box:
+        outer, ends = self.radius + 0.5 * self.width, self._ends
+        after = np.roll(ends, -1, axis=0)
+        cut = ends[:, 0] * after[:, 0] < 0  # sides that cross the middle, where they end
+        at = ends[cut, :1] / (ends[cut, :1] - after[cut, :1])
+        ends = np.concatenate([ends[ends[:, 0] >= 0], ends[cut] + (after[cut] - ends[cut]) * at])
         wide = max(float(ends[:, 0].max()), outer if self.angle >= math.pi / 2 else 0.0)
         return flat((-wide, float(ends[:, 1].min())), (wide, outer))
 
+    def extent(self, level: float) -> Box:
+        low, high = super().extent(level)
+        if level > 0:  # what is cut off still tells its distance
+            low[1] = min(low[1], float(self._ends[:, 1].min()) - level)
+        return low, high
+
     @cached_property
     def accuracy(self) -> Accuracy:
-        return "outside"
+        return "outside" if self._ends[:, 0].min() >= 0 else "bound"  # legs that cross are cut where they do
 
 
 @dataclass(frozen=True)
@@ -808,6 +826,8 @@ def polygon(*points: Vec2) -> Triangle | Quad:
         return Triangle(*points)
     if len(points) == 4:
         return Quad(*points)
+    if len(points) == 1:
+        raise ParameterError("polygon: its corners are given one by one, polygon((x, y), (x, y), (x, y))")
     raise ParameterError(f"polygon: {len(points)} corners; unite polygons of 3 or 4")
 
 

@@ -26,7 +26,7 @@ from typing import ClassVar
 import numpy as np
 
 from tyndall.gpu.params import ParameterError, check, param
-from tyndall.sdf.modifiers import weakest
+from tyndall.sdf.modifiers import at_a_wall, weakest
 from tyndall.sdf.shape import Accuracy, Box, Floats, Modifier, Shape, Vec3, of_shape, rotation
 
 MOST_COPIES = 4096
@@ -245,8 +245,7 @@ class MirroredForever(Modifier):
     @cached_property
     def accuracy(self) -> Accuracy:
         (low, high), half = self.shape.box, 0.5 * np.array(self.spacing)
-        inside = ((-low <= half) & (high <= half))[half > 0].all()
-        return self.shape.accuracy if inside else "bound"
+        return at_a_wall(self.shape.accuracy, float(np.minimum(half + low, half - high)[half > 0].min()))
 
 
 def _some_spacing(shape: RepeatedForever | MirroredForever) -> None:
@@ -265,22 +264,22 @@ def repeat(
 ) -> Repeated | RepeatedForever | MirroredForever:
     """As :meth:`tyndall.sdf.shape.Shape.repeat`."""
     flat = of_shape(shape) == 2
-    x, y, z = (
-        (spacing, spacing, 0.0 if flat else spacing)
-        if isinstance(spacing, (int, float, np.number))
-        else _triple(spacing)
-    )
+    x, y, z = _triple("spacing", spacing, 0.0 if flat else None)
     if count is None:
         return (MirroredForever if mirrored else RepeatedForever)(shape, (x, y, z))
     if mirrored:
         raise ParameterError("mirrored: only without end; leave out the count")
-    i, j, k = (count, count, 1 if flat else count) if isinstance(count, (int, np.integer)) else _triple(count)
+    i, j, k = _triple("count", count, 1 if flat else None)
     return Repeated(shape, (x, y, z), (i, j, k))
 
 
-def _triple[T: float](values: Sequence[T]) -> tuple[T, T, T]:
-    if len(values) != 3:
-        raise ParameterError(f"repeat: {values} is not one number or three")
+def _triple[T: float](what: str, values: T | Sequence[T], z: T | None) -> tuple[T, T, T]:
+    """Three numbers from one or three; of one, the last is ``z`` where that is given."""
+    if isinstance(values, (int, float, np.number)):
+        one: T = values
+        return one, one, one if z is None else z
+    if not isinstance(values, (Sequence, np.ndarray)) or isinstance(values, str) or len(values) != 3:
+        raise ParameterError(f"{what}: {values!r} is not one number or three")
     return values[0], values[1], values[2]
 
 

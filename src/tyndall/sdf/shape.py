@@ -82,7 +82,10 @@ class Shape:
         Raises:
             ParameterError: another shape of array.
         """
-        p = np.asarray(points, np.float64)
+        try:
+            p = np.asarray(points, np.float64)
+        except (TypeError, ValueError):
+            raise ParameterError(f"points: not an array of numbers of shape (count, {self.dimension})") from None
         if p.ndim != 2 or p.shape[1] not in ((2, 3) if self.dimension == 2 else (3,)):
             raise ParameterError(f"points: shape {p.shape} is not (count, {self.dimension})")
         if p.shape[1] == 2:
@@ -146,7 +149,10 @@ class Shape:
         try:
             matrix[:3, 3] = x, y, z
         except (TypeError, ValueError):
-            raise ParameterError(f"at: {(x, y, z)} are not three numbers") from None
+            hint = "; a tuple is given as .at(*place)" if isinstance(x, Iterable) and not isinstance(x, str) else ""
+            raise ParameterError(f"at: {(x, y, z)} are not three numbers{hint}") from None
+        if not np.isfinite(matrix).all():
+            raise ParameterError(f"at: {(x, y, z)} are not finite numbers")
         return self.transform(matrix)
 
     def rotate(self, angle: float, axis: Sequence[float] = Z) -> Shape:
@@ -155,11 +161,7 @@ class Shape:
 
     def orient(self, axis: Sequence[float]) -> Shape:
         """Turned so that its own +Z points along ``axis``."""
-        to = np.asarray(axis, np.float64)
-        length = float(np.linalg.norm(to))
-        if to.shape != (3,) or not 0 < length < math.inf:
-            raise ParameterError(f"axis: {axis} is no direction")
-        to = to / length
+        to = unit(axis)
         turn = np.cross(Z, to)
         sine = float(np.linalg.norm(turn))
         if sine < 1e-12:
@@ -172,6 +174,8 @@ class Shape:
             factors = np.broadcast_to(np.asarray(factor, np.float64), 3)
         except (TypeError, ValueError):
             raise ParameterError(f"factor: {factor!r} is not one number or three") from None
+        if not (np.isfinite(factors).all() and (np.abs(factors) > 1e-12).all()):
+            raise ParameterError(f"factor: {factor!r} is no finite enlargement above 0")
         return self.transform(np.diag([*factors, 1.0]))
 
     def transform(self, matrix: ArrayLike) -> Shape:
@@ -256,8 +260,7 @@ class Shape:
         """``count`` copies turned about an axis through 0; see :class:`tyndall.sdf.repetition.Polar`."""
         from tyndall.sdf import repetition
 
-        if len(axis) != 3:
-            raise ParameterError(f"axis: {axis} is no direction")
+        unit(axis)
         return repetition.Polar(self, count, (axis[0], axis[1], axis[2]))
 
     def moved(self, moves: Mapping[str, Iterator[Floats]]) -> Shape:
@@ -356,15 +359,30 @@ def _modified(kind: str, *arguments: Any) -> Shape:
 
 def rotation(angle: float, axis: Sequence[float]) -> Floats:
     """4×4: a right-handed turn by ``angle`` radians about ``axis`` (Rodrigues 1840)."""
-    a = np.asarray(axis, np.float64)
-    length = float(np.linalg.norm(a))
-    if a.shape != (3,) or not 0 < length < math.inf:
-        raise ParameterError(f"axis: {axis} is no direction")
-    x, y, z = a / length
+    x, y, z = unit(axis)
+    if not isinstance(angle, (int, float, np.number)) or not math.isfinite(angle):
+        raise ParameterError(f"angle: {angle!r} is no finite number")
     k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     matrix = np.eye(4)
     matrix[:3, :3] += math.sin(angle) * k + (1 - math.cos(angle)) * (k @ k)
+    matrix[np.abs(matrix) < 1e-15] = 0.0  # a quarter turn of what has no end on one axis gives it none on another
     return matrix
+
+
+def unit(axis: Sequence[float]) -> Floats:
+    """(3,): a direction at length 1.
+
+    Raises:
+        ParameterError: not three finite numbers, or all of them 0.
+    """
+    try:
+        to = np.asarray(axis, np.float64)
+    except (TypeError, ValueError):
+        to = np.zeros(0)
+    length = float(np.linalg.norm(to))
+    if to.shape != (3,) or not 0 < length < math.inf:
+        raise ParameterError(f"axis: {axis!r} is no direction")
+    return to / length
 
 
 def of_shape(shape: Any) -> int:
@@ -557,6 +575,8 @@ class Combination(Shape):
         if not self.shapes:
             raise ParameterError("shapes: none are given")
         for i, shape in enumerate(self.shapes):
+            if isinstance(shape, (list, tuple)):
+                raise ParameterError(f"shapes[{i}]: a {type(shape).__name__}; its shapes are given as union(*shapes)")
             if not isinstance(shape, Shape):
                 raise ParameterError(f"shapes[{i}]: {shape!r} is no shape")
             of_shape(shape)
@@ -763,6 +783,6 @@ class Named(Marked):
     name: str
 
     def __post_init__(self) -> None:
-        if not isinstance(self.name, str):
+        if not isinstance(self.name, str) or not self.name:
             raise ParameterError(f"name: {self.name!r} is no name")
         object.__setattr__(self, "dimension", of_shape(self.shape))

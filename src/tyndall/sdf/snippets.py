@@ -37,7 +37,7 @@ import atexit
 import inspect
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, Field, dataclass, field, make_dataclass
 from functools import cache, cached_property
 from typing import Any, ClassVar, get_args, get_origin, get_type_hints
@@ -223,7 +223,10 @@ class Snippet(Primitive):
 
 
 def _corner(name: str, corner: Sequence[float], missing: float) -> Vec3:
-    found = tuple(missing if x is None else float(x) for x in corner)
+    try:
+        found = tuple(missing if x is None else float(x) for x in corner)
+    except (TypeError, ValueError):
+        raise ParameterError(f"{name}: {corner} is no corner of a box") from None
     if len(found) == 2:
         found = (*found, missing)
     if len(found) != 3 or any(math.isnan(x) for x in found):
@@ -267,10 +270,25 @@ class SnippetKind:
             raise ParameterError(message) from None
         named = {f.name: getattr(given, f.name) for f in fields_of(self.parameters)}
         values = [x for value in named.values() for x in (value if isinstance(value, tuple) else (value,))]
-        box = self._box(**named) if callable(self._box) else self._box
-        low, high = _EVERYWHERE if box is None else box
-        slope = self._lipschitz(**named) if callable(self._lipschitz) else self._lipschitz
-        return Snippet(self.source, tuple(values), slope, tuple(low), tuple(high), self._growth, self._exact)  # type: ignore[arg-type]
+        box, slope = self._told("box", self._box, named), self._told("lipschitz", self._lipschitz, named)
+        try:
+            low, high = _EVERYWHERE if box is None else (tuple(corner) for corner in box)
+        except (TypeError, ValueError):
+            raise ParameterError(f"{self.__name__}: box: {box!r} is not two corners") from None
+        try:
+            return Snippet(self.source, tuple(values), slope, low, high, self._growth, self._exact)
+        except ParameterError as error:
+            raise ParameterError(re.sub("^slope:", f"{self.__name__}: lipschitz:", str(error))) from None
+
+    def _told(self, what: str, told: Any, named: Mapping[str, Any]) -> Any:
+        """What is declared for these numbers."""
+        if not callable(told):
+            return told
+        try:
+            return told(**named)
+        except TypeError as error:
+            taken = ", ".join(named) or "nothing"
+            raise ParameterError(f"{self.__name__}: {what}: not a function of {taken}: {error}") from None
 
     @property
     def bounds(self) -> dict[str, Any]:

@@ -6,6 +6,7 @@ import inspect
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import props
@@ -103,6 +104,24 @@ def test_numbers_as_the_documents_primitive() -> None:
 def test_mistakes(make: object, message: str) -> None:
     with pytest.raises((ParameterError, SnippetError), match=message):
         make()  # type: ignore[operator]
+
+
+@pytest.mark.parametrize(
+    ("declared", "message"),
+    [
+        ({"lipschitz": -1.0}, "^ring: lipschitz: -1 is outside"),
+        ({"lipschitz": lambda wide: 1.0}, "^ring: lipschitz: not a function of radius: .*'radius'"),
+        ({"box": (1, 2)}, r"^ring: box: \(1, 2\) is not two corners"),
+        ({"box": ((0, 0, "a"), (1, 1, 1))}, "is no corner of a box"),
+        ({"growth": 0.0}, "^growth: 0 is outside"),
+    ],
+)
+def test_what_is_declared_wrongly_is_told_by_its_name(declared: dict[str, Any], message: str) -> None:
+    def ring(radius: float = 0.5) -> str:
+        return "fn ring(p: vec3f, radius: f32) -> f32 { return radius - length(p); }"
+
+    with pytest.raises(ParameterError, match=message):
+        snippet(**declared)(ring)()
 
 
 def test_a_mistake_stands_in_the_python_file() -> None:

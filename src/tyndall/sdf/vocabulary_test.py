@@ -18,7 +18,7 @@ import pytest
 from tyndall import sdf
 from tyndall.gpu.device import Gpu
 from tyndall.gpu.params import ParameterError, fields_of
-from tyndall.scene.model import Implicit, Material
+from tyndall.scene.model import Implicit, Material, Volume
 from tyndall.sdf import X, Y, Z
 from tyndall.sdf.modifiers import Bend, Displace, Elongate, Extrude, Mirror, Noise, Revolve, Round, Shell, Twist
 from tyndall.sdf.profiles import PROFILES
@@ -92,6 +92,8 @@ CASES: dict[str, Shape] = {
     "cut disk, little": sdf.cut_disk(0.9, 0.5),
     "arc, short": sdf.arc(0.4, 0.9, 0.3),
     "horseshoe, short": sdf.horseshoe(0.9, 0.7, 0.4, 0.2),
+    "horseshoe, stubby": sdf.horseshoe(0.8, 0.7, 0.05, 0.9),
+    "horseshoe, crossed": sdf.horseshoe(2.9, 0.3, 0.6, 0.1),
     "horseshoe, long": sdf.horseshoe(2.6, 0.7, 0.2, 0.2),
     "moon, thin": sdf.moon(1.0, 0.9, 0.3),
     "moon, great bite": sdf.moon(0.7, 1.1, 0.6),
@@ -515,6 +517,23 @@ def test_a_limited_repetition_is_its_copies() -> None:
     np.testing.assert_allclose(ring(p), by_hand(p))
 
 
+def test_what_touches_a_mirror_is_no_distance_inside() -> None:
+    """The surface that it had there is gone; where it is apart from the mirror nothing changes, across it all does."""
+    flat, solid = sdf.rectangle(1), sdf.box(1)
+    for place, accuracy in ((0.7, "exact"), (0.5, "outside"), (0.3, "bound")):
+        assert flat.at(place).revolve().accuracy == accuracy
+        assert flat.revolve(place).accuracy == accuracy
+        assert solid.at(place).mirror().accuracy == accuracy
+        assert solid.repeat(2 * place, mirrored=True).accuracy == accuracy
+    p = np.array([[0.1, 0.0, 0.2]])
+    assert flat.at(0.5).revolve()(p)[0] > -0.25  # a cylinder's is -0.5
+
+
+def test_quarter_turns_keep_what_has_no_end_on_its_axis() -> None:
+    low, high = sdf.cylinder(0.5).orient(X).box
+    np.testing.assert_allclose([low, high], [(-np.inf, -0.5, -0.5), (np.inf, 0.5, 0.5)])
+
+
 def test_a_mirrored_repetition_is_mirror_images() -> None:
     shape = sdf.cone(0.2, 0.4).at(0.1, 0.1, 0.1)
     p = np.random.default_rng(0).uniform(-0.5, 0.5, (300, 3))
@@ -573,13 +592,24 @@ MISTAKES = {
     "sphere().repeat(0)": "spacing: 0 on all axes",
     "sphere().repeat(1, (99, 99, 1))": "counts: 9801 copies are more than 4096",
     "sphere().repeat(1, 2, mirrored=True)": "mirrored: only without end; leave out the count",
-    "sphere().repeat((1, 2))": "repeat: (1, 2) is not one number or three",
+    "sphere().repeat((1, 2))": "spacing: (1, 2) is not one number or three",
     "circle().repeat((1, 1, 1))": "spacing: a flat shape has no copies along Z",
     "sphere().polar(0)": "number: 0 is outside 1 … 4096",
     "circle().polar(3, X)": "axis: a flat shape turns about Z only",
     "sphere().mirror('w')": "axes: 'w' is not some of x, y and z",
     "sphere().orient((0, 0, 0))": "axis: (0, 0, 0) is no direction",
-    "sphere().scale(0)": "matrix: not finite numbers that have an inverse",
+    "sphere().scale(0)": "factor: 0 is no finite enlargement above 0",
+    "sphere().at((1, 2, 3))": "at: ((1, 2, 3), 0.0, 0.0) are not three numbers; a tuple is given as .at(*place)",
+    "sphere().at(float('nan'))": "at: (nan, 0.0, 0.0) are not finite numbers",
+    "sphere().rotate(90, 'x')": "axis: 'x' is no direction",
+    "sphere().rotate(float('inf'))": "angle: inf is no finite number",
+    "sphere().repeat(1, 2.5)": "counts: (2.5, 2.5, 2.5) is not 3 whole numbers",
+    "sphere().repeat(3, 'x')": "count: 'x' is not one number or three",
+    "sphere().named('')": "name: '' is no name",
+    "sphere()('x')": "points: not an array of numbers of shape (count, 3)",
+    "from_mesh('x.obj')": "mesh: 'x.obj' is no Mesh; tyndall.load(file).instances have some",
+    "union([sphere()])": "shapes[0]: a list; its shapes are given as union(*shapes)",
+    "polygon([(0, 0), (1, 1), (2, 0)])": ("polygon: its corners are given one by one, polygon((x, y), (x, y), (x, y))"),
     "round_cone(radius_a=3)": "round_cone: one ball holds the other; use a sphere",
     "ellipsoid((1, 1, 0.001))": "radii: one is less than a hundredth of another; scale a sphere",
     "rounded_box(1, 0.6)": "radius: 0.6 is more than half the shortest side",
@@ -603,6 +633,10 @@ def test_a_mistake_is_told_in_one_line(text: str) -> None:
 def test_a_flat_shape_is_no_object() -> None:
     with pytest.raises(ParameterError, match="Circle is no solid shape"):
         Implicit(sdf.circle())
+    with pytest.raises(ParameterError, match="^material: 'red' is no Material$"):
+        Implicit(sdf.sphere(), material="red")  # type: ignore[arg-type]
+    with pytest.raises(ParameterError, match="^medium: 3 is no Medium$"):
+        Volume(sdf.sphere(), 3)  # type: ignore[arg-type]
 
 
 # --- what is no shape -----------------------------------------------------------------------------------------------

@@ -230,7 +230,7 @@ def load(path: Path) -> Scene:
         raise SceneError(path, f"not JSON: {error}") from error
     if not isinstance(data, dict):
         raise SceneError(path, "not a scene: a JSON object is expected")
-    if "version" not in data and ("scene" in data or "model" in data):
+    if "version" not in data and not {"scene", "model", "code", "base_shader"}.isdisjoint(data):
         implicit: Scene = codec().load_scene(path)
         return implicit
 

@@ -14,6 +14,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+import re
 from collections.abc import Iterable, Sequence
 from functools import cache
 from types import NoneType, UnionType
@@ -380,9 +381,29 @@ def _fields_at(loc: Sequence[str | int]) -> list[str]:
 
 
 def parse(raw: bytes) -> Any:
-    """The JSON value of a file.
+    """The JSON value of a file. Texts may have line ends and tabs in them, as code is written by hand.
 
     Raises:
         ValueError: not JSON, not UTF-8, or nested too deeply; the message says where.
     """
-    return pydantic_core.from_json(raw, allow_inf_nan=True)
+    try:
+        return pydantic_core.from_json(raw, allow_inf_nan=True)
+    except ValueError as error:
+        if "control character" not in str(error):
+            raise
+    escaped = _TEXT.sub(_escape, raw)
+    try:
+        return pydantic_core.from_json(escaped, allow_inf_nan=True)
+    except ValueError:
+        try:
+            json.loads(raw, strict=False)  # says where, in lines of the file as it is
+        except json.JSONDecodeError as error:
+            raise ValueError(f"{error.msg} at line {error.lineno} column {error.colno}") from None
+        raise
+
+
+_TEXT = re.compile(rb'"(?:[^"\\]|\\.)*"', re.DOTALL)
+
+
+def _escape(text: re.Match[bytes]) -> bytes:
+    return text[0].replace(b"\r", b"\\r").replace(b"\n", b"\\n").replace(b"\t", b"\\t")

@@ -45,10 +45,13 @@ def save(shape: Shape, path: str | PathLike[str], *, name: str = "") -> None:
 
     Raises:
         SceneError: the path does not end in ``.json`` or cannot be written, or the shape holds what JSON cannot.
+        ParameterError: it is no shape.
     """
     from tyndall.sdf.files.writer import write_model
 
     file = Path(path)
+    if not isinstance(shape, Shape):
+        raise ParameterError(f"shape: {type(shape).__name__} is no shape")
     if file.suffix.lower() != ".json":
         raise SceneError(file, "a shape is saved as .json")
     try:
@@ -72,7 +75,9 @@ def load_scene(path: Path) -> Scene:
         except ParameterError as error:
             raise SceneError(path, f"model: {error}") from error
     if not isinstance(made, Scene):
-        raise SceneError(path, "is no scene and no model")
+        kinds = {SnippetKind: "custom primitive", FragmentShader: "fragment shader", Material: "material"}
+        what = next(text for kind, text in kinds.items() if isinstance(made, kind))
+        raise SceneError(path, f"is a {what}; a model or a scene that uses it can be drawn")
     return stage(made)
 
 

@@ -200,6 +200,23 @@ def test_a_scene_is_put_on_a_stage(folder: Path) -> None:
     assert not scene.instances
 
 
+def test_code_of_several_lines_is_drawn_too(folder: Path) -> None:
+    """What :func:`tyndall.load` takes for a scene may have line ends in its texts; parts of one say what they are."""
+    given = HEX_PRISM.rstrip().removesuffix("}") + "}"
+    text = f'{{"model": {{"type": "Primitives/HexPrism"}}, "primitives": [{given}]}}'
+    (implicit,) = tyndall.load(write(folder, text, "inline.json")).implicits
+    assert implicit.shape == load(folder / "inline.json")
+    for name, what in (
+        ("hex_prism", "custom primitive"),
+        ("blend_shader", "fragment shader"),
+        ("blend_material", "mat"),
+    ):
+        with pytest.raises(SceneError, match=f"is a {what}.*; a model or a scene that uses it can be drawn"):
+            tyndall.load(folder / f"{name}.json")
+    with pytest.raises(SceneError, match="not JSON: .* at line 3 column 9"):
+        tyndall.load(write(folder, '{"code": "\n", \n"model" 3}', "wrong.json"))
+
+
 # --- transforms ---------------------------------------------------------------------------------------------------
 
 
@@ -348,7 +365,7 @@ NAMED_SPHERE = SnippetSource("Sphere", "fn sphere(p: vec3f) -> f32 { return leng
         Transformed(Transformed(sdf.sphere(1), sdf.sphere(1).at(1).matrix), sdf.sphere(1).at(2).matrix),  # type: ignore[attr-defined]
         sdf.sphere(1).material(RED).at(1).named("é\n").material(RED),
         Painted(Painted(sdf.sphere(1), RED), Material()),
-        Named(Named(sdf.sphere(1), "a"), ""),
+        Named(Named(sdf.sphere(1), "a"), " "),
         Combination((sdf.sphere(1),)),
         Combination((sdf.sphere(1).material(RED), sdf.box(2)), "subtraction", 0.25, "root"),
         Combination((sdf.sphere(1), Combination((sdf.box(1), sdf.box(2)))), "union"),
@@ -562,6 +579,8 @@ def test_references_stay_in_the_folder(folder: Path) -> None:
 def test_what_cannot_be_saved(tmp_path: Path) -> None:
     with pytest.raises(SceneError, match="saved as .json"):
         save(sdf.sphere(1), tmp_path / "a.txt")
+    with pytest.raises(ParameterError, match="^shape: int is no shape$"):
+        save(3, tmp_path / "a.json")  # type: ignore[arg-type]
     with pytest.raises(SceneError, match="not text that UTF-8"):
         save(sdf.sphere(1).named("\ud800"), tmp_path / "a.json")
     assert not list(tmp_path.iterdir())

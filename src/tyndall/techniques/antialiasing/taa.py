@@ -3,8 +3,9 @@
 Each frame's samples are shifted inside their pixels (Halton sequence in bases 2 and 3, Halton 1964). The history is
 read where the surface was in the last frame, with a Catmull–Rom filter, clipped to the colours around the pixel
 (Karis 2014's box in YCoCg, from mean and deviation as Salvi 2016, no larger than the colours themselves), and blended
-with the new sample. While the camera stands still, nothing is clipped and the blend weight falls as 1/n until
-``blend``, so that a still picture converges fast.
+with the new sample. Where something in the scene moves and the history has nothing as deep around the place, it is left
+out: an object has uncovered what the pixel shows. While the camera stands still, nothing is clipped and the blend
+weight falls as 1/n until ``blend``, so that a still picture converges fast.
 """
 
 from __future__ import annotations
