@@ -353,8 +353,8 @@ def test_an_objects_motion_is_told_from_that_of_the_camera(gpu: Gpu) -> None:
         before = np.linalg.inv(turn) @ (*place, 1.0)
         step = place[:2] / -place[2] - before[:2] / -before[2]
         np.testing.assert_allclose(row, step / (height * 64 / 48, -height), atol=0.004)
-    np.testing.assert_array_equal(moved[2], 0)
-    np.testing.assert_array_equal(still, 0)
+    np.testing.assert_allclose(moved[2], 0, atol=1e-7)  # of the picture's size: rounding, on some devices
+    np.testing.assert_allclose(still, 0, atol=1e-7)
 
 
 def test_the_motion_of_parts_is_told_from_that_of_their_object(gpu: Gpu) -> None:
