@@ -104,8 +104,9 @@ def test_every_entry_point_compiles_and_is_used(gpu: Gpu, monkeypatch: pytest.Mo
     solid = Scene(SHAPES[:2], LIGHTS[:1], props.AHEAD)  # maps of what has holes are not drawn in compute
     with Renderer(solid, (8, 6), gpu=gpu, shadow=ShadowMap(size=64, rasterizer="compute")) as renderer:
         renderer.draw()
-    monkeypatch.setattr("tyndall.sdf.field._LONG", 8)  # so that a short program's leaves are sorted out as well
-    short, long = (union(*[sphere(0.1).at(0.2 * i) for i in range(n)], smooth=0.1) for n in (6, 9))
+    for name in ("_LONG", "_SPLIT"):  # so that a short program's leaves are sorted out and its cells split as well
+        monkeypatch.setattr(f"tyndall.sdf.field.{name}", 8)
+    short, long = (union(*[sphere(0.1).named("ball").at(0.2 * i) for i in range(n)], smooth=0.1) for n in (6, 9))
     surface = Material(emissive=(1, 1, 1), reflections=True)
     surfaces = [Implicit(shape, _mirror, surface) for shape in (short, long)]
     cloud = Volume(sphere(0.5), Medium(0.1))
@@ -114,6 +115,7 @@ def test_every_entry_point_compiles_and_is_used(gpu: Gpu, monkeypatch: pytest.Mo
         renderer.draw()  # reflections and clouds are drawn unless told otherwise, and compiled for each kind of shadow
         for family in ("reflection", "volume"):
             renderer.use(family, "none")
+        renderer.move("ball", np.full((15, 3), 0.01))  # antialiasing follows parts that move
         renderer.use("occlusion", "field_ao")
         for name in ("field", "planar", "projective"):
             cls = FAMILIES["shadow"].members[name]
