@@ -113,9 +113,7 @@ def test_every_entry_point_compiles_and_is_used(gpu: Gpu, monkeypatch: pytest.Mo
     cloud = Volume(sphere(0.5), Medium(0.1))
     fields = Scene(SHAPES[:1], LIGHTS[:1], props.AHEAD, Medium(0.1), implicits=surfaces, volumes=[cloud])
     with Renderer(fields, (8, 6), gpu=gpu, shadow=ShadowMap(size=16)) as renderer:
-        for _ in range(
-            3
-        ):  # reflections and clouds are drawn unless told otherwise, and compiled for each kind of shadow
+        for _ in range(3):  # with reflections and clouds, compiled for each kind of shadow, and in motion
             renderer.draw()
             renderer.move("part", np.eye(4))
         for family in ("reflection", "volume"):

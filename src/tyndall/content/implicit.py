@@ -6,6 +6,10 @@ and the material of what was found; ``field_depth`` is a full-screen triangle th
 March and resolve are apart, as they need different registers and one of them is done for hits alone. Both are compute,
 since GPUs that mostly compute shade fragments many times slower.
 
+**Motion.** Where a technique asks for it (``reads_motion``), what a pixel shows is followed back to the last frame: an
+object by its transform, and where parts of it have moved by themselves, ``flow`` runs the object's program once more
+with the places that its leaves had (``flow.wesl``).
+
 **From a light.** What a light sees is marched the same way into an image of depths, texel by texel of the map that is
 to be drawn, and a full-screen triangle draws that image into the map: so every technique that works on maps shows the
 shadows of implicit surfaces. They have no outline, and techniques that extrude outlines take them from such a map.
