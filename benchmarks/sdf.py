@@ -37,8 +37,8 @@ def main() -> None:
     parser.add_argument("--loop-seconds", type=float, help="of each measurement of the plain loop")
     parser.add_argument("--timeout", type=float, help="seconds after which a compiler is ended")
     parser.add_argument("--parts", type=names, help=f"some of {','.join(bench_sdf.PARTS)}")
-    parser.add_argument("--scenes", type=names, help="names, comma-separated")
-    parser.add_argument("--swarm", type=numbers(","), help="numbers of primitives, comma-separated")
+    parser.add_argument("--scenes", type=names, help="names, comma-separated, or none")
+    parser.add_argument("--swarm", type=numbers(","), help="numbers of primitives, comma-separated, or none")
     parser.add_argument("--size", type=numbers("x"), help="WxH")
     parser.add_argument("--peer", choices=("too", "only", "none"), default="too")
     parser.add_argument("--out", type=Path, default=os.environ.get("OUT"))
@@ -98,6 +98,11 @@ def numbers(between: str) -> Callable[[str], tuple[int, ...]]:
         return tuple(int(number) for number in text.split(between))
 
     return whole_numbers
+
+
+def listed(text: str | None) -> tuple[str, ...] | None:
+    """What is named, comma-separated; "none" names nothing, and None is left to the settings."""
+    return tuple(text.split(",") if text != "none" else ()) if text else None
 
 
 def keep(document: dict[str, Any], out: Path | None) -> None:
