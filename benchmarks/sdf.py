@@ -87,22 +87,17 @@ def main() -> None:
 
 
 def names(text: str) -> tuple[str, ...]:
-    """Of a list with commas."""
-    return tuple(text.split(","))
+    """Of a list with commas; "none" is an empty one."""
+    return tuple(text.split(",")) if text != "none" else ()
 
 
 def numbers(between: str) -> Callable[[str], tuple[int, ...]]:
-    """Of a list with something between them."""
+    """Of a list with something between them; "none" is an empty one."""
 
     def whole_numbers(text: str) -> tuple[int, ...]:
-        return tuple(int(number) for number in text.split(between))
+        return tuple(int(number) for number in text.split(between)) if text != "none" else ()
 
     return whole_numbers
-
-
-def listed(text: str | None) -> tuple[str, ...] | None:
-    """What is named, comma-separated; "none" names nothing, and None is left to the settings."""
-    return tuple(text.split(",") if text != "none" else ()) if text else None
 
 
 def keep(document: dict[str, Any], out: Path | None) -> None:
