@@ -36,6 +36,7 @@ from tyndall.techniques import FAMILIES  # noqa: E402
 
 SLOW_MS = 1500.0  # a frame of the plain loop that would take longer is measured smaller
 _SMALLER = 4  # as wide and high
+_SMALL = 64, 36
 _IMPATIENT = 75  # the status of a process whose patience has ended
 
 
@@ -50,7 +51,8 @@ class Order:
         techniques: of our frame, by family.
         changes: their parameters, by technique.
         patience: seconds until the pipelines are there, if not 0; then the process ends.
-        in_turn: processes that were told so compile at the same time, but only one of them draws.
+        in_turn: processes that were told so compile at the same time, but only one of them draws; their first pictures
+            are small.
     """
 
     scene: str
@@ -99,11 +101,12 @@ def run(order: Order, gpu: Gpu | None = None, scene: Scene | None = None) -> dic
         begin = time.perf_counter()
         described = scene or open_scene(order.scene)
         found["scene_ms"] = _since(begin)
+        first_size = _SMALL if order.in_turn else size  # one frame of a plain loop may take a minute
         for name in ("first_ms", "warm_ms"):
             begin, before = time.perf_counter(), len(device.built)
             if order.patience > 0 and name == "first_ms":
                 end.start()
-            with _make(order, device, described, size) as drawn:
+            with _make(order, device, described, first_size) as drawn:
                 setup_ms = _since(begin)
                 end.cancel()
                 if order.in_turn and name == "first_ms":
@@ -119,7 +122,7 @@ def run(order: Order, gpu: Gpu | None = None, scene: Scene | None = None) -> dic
                 if name == "first_ms" and isinstance(drawn, Baseline):
                     found["compile_ms"] = round(drawn.compile_ms, 3)
                 if name == "warm_ms" and order.seconds > 0:
-                    found |= frames_of(order, device, described, drawn)
+                    found |= frames_of(order, device, described)
     finally:
         turn.close()
         if made:
@@ -147,23 +150,22 @@ def _make(order: Order, gpu: Gpu, scene: Scene, size: tuple[int, int], settings:
     return Baseline(gpu, scene, size, stage=stage, moving=order.loops, settings=settings)
 
 
-def frames_of(order: Order, gpu: Gpu, scene: Scene, drawn: Any) -> dict[str, Any]:
+def frames_of(order: Order, gpu: Gpu, scene: Scene) -> dict[str, Any]:
     """The time of frames; of the plain loop where a frame would take very long, of a smaller picture, by its pixels."""
     size = (int(order.size[0]), int(order.size[1]))
-    if order.who == "ours":
-        return _measured(order, gpu, drawn)
     small = (max(1, size[0] // _SMALLER), max(1, size[1] // _SMALLER))
-    settings = Loop.of(scene, size)  # with the large picture's cones
-    with _make(order, gpu, scene, small, settings) as probe:
-        for _ in range(2):
-            probe.draw()
-            taken = probe.timings().get("frame", 0.0)
-        share = size[0] * size[1] / (small[0] * small[1])
-        if taken * share > SLOW_MS:
-            found = _measured(order, gpu, probe)
-            scaled = {key: value * share for key, value in found["frame_ms"].items()}
-            return {**found, "frame_ms": scaled, "measured_size": list(small)}
-    return _measured(order, gpu, drawn)
+    if order.who != "ours":
+        with _make(order, gpu, scene, small, Loop.of(scene, size)) as probe:  # with the large picture's cones
+            for _ in range(2):
+                probe.draw()
+                taken = probe.timings().get("frame", 0.0)
+            share = size[0] * size[1] / (small[0] * small[1])
+            if taken * share > SLOW_MS:
+                found = _measured(order, gpu, probe)
+                scaled = {key: value * share for key, value in found["frame_ms"].items()}
+                return {**found, "frame_ms": scaled, "measured_size": list(small)}
+    with _make(order, gpu, scene, size) as whole:
+        return _measured(order, gpu, whole)
 
 
 def _measured(order: Order, gpu: Gpu, drawn: Any) -> dict[str, Any]:
