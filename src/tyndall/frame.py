@@ -220,9 +220,9 @@ class Renderer(Closing):
             "inscatter_out": self._images["inscatter"].write(),
             "transmittance_out": self._images["transmittance_map"].write(),
         }
-        self._drawn, self._marched = {"depth": self._scope["depth"]}, {"depth": self._scope["depth"]}
+        self._drawn = self._marched = self._scope["depth"]
         if self._fields:
-            self._marched = {"depth": self._fields.depth.sampled().telling(_DEPTH_OF.replace("0);", "0).x;"))}
+            self._marched = self._fields.depth.sampled().telling(_DEPTH_OF.replace("0);", "0).x;"))
             self._scope |= self._fields.bindings
             self._scope |= {f"{name}_out": self._images[name].write() for name in self._targets}
         for family, technique in techniques.items():
@@ -368,7 +368,7 @@ class Renderer(Closing):
         # Clearing, and drawing a depth that is there already, takes a GPU that mostly computes more than a millisecond.
         alone = self._fields is not None and not self.scene.instances
         marched = alone and not any(view.technique.tests_depth for view in self._views.values())
-        self._scope["depth"] = (self._marched if marched else self._drawn)["depth"]
+        self._scope["depth"] = self._marched if marched else self._drawn
         scope = self._scope
 
         targets = [(images[name].view(), (0.0, 0.0, 0.0, 0.0)) for name in self._targets]

@@ -68,8 +68,8 @@ _LEAST_ENTRIES, _MOST_ENTRIES = 1 << 12, 1 << 23
 _AMPLE_ENTRIES = 1 << 21  # up to here twice as many for each instruction
 _PART_SIZE = 4096  # instructions for which one part is enough
 _LONG = 96  # instructions: a longer program's leaves are sorted out first
-_LONGEST = 32 * 1024  # of those; beyond, cells walk all of it; as in prune.wesl
-_SEGMENT = 256  # of them, as in prune.wesl
+_LONGEST = 32 * 1024  # of those; beyond, cells walk all of it; as in unions.wesl
+_SEGMENT = 256  # of them, as in unions.wesl
 _FEW_MARKS = 512  # instructions whose marks need no memory; as in prune.wesl
 _MOST_MARKS = 1 << 23  # words
 _MOST_SLOTS = 1 << 24  # before samples, whose place is a float
@@ -516,12 +516,10 @@ class Field(Closing):
     # --- what an object is on the device ---
 
     def _describe(self, index: int) -> None:
-        """Write an object's row."""
+        """Write an object's row anew."""
         made, row = self._objects[index], self._rows[index]
         made.jobs = None
         program = made.program
-        row["to_local"] = np.linalg.inv(made.placement)[:3]
-        row["factor"] = np.linalg.svd(made.placement[:3, :3], compute_uv=False)[-1]
         low, high = made.box
         longest = float(np.max(high - low)) if np.isfinite(high - low).all() else 0.0
         margin = _MARGIN * longest
@@ -539,6 +537,13 @@ class Field(Closing):
             row["cell"] = width
             row["counts"] = np.clip(blocks, 1, 4) * (finest // 4)
             row["first_cell"] = made.first_cell + (_COARSE**3 if made.levels > 1 else 0)
+        self._write_row(index)
+
+    def _write_row(self, index: int) -> None:
+        """Write it with where the object stands."""
+        placed, row = self._objects[index].placement, self._rows[index]
+        row["to_local"] = np.linalg.inv(placed)[:3]
+        row["factor"] = np.linalg.svd(placed[:3, :3], compute_uv=False)[-1]
         self._write(self._object_buffer, self._rows[index : index + 1], index * self._rows.itemsize)
 
     # --- motion ---
@@ -569,11 +574,8 @@ class Field(Closing):
 
     def place(self, index: int, transform: Any) -> None:
         """An object stands elsewhere: one write, and nothing is pruned again."""
-        made, row = self._objects[index], self._rows[index]
-        made.placement = placement(transform)
-        row["to_local"] = np.linalg.inv(made.placement)[:3]
-        row["factor"] = np.linalg.svd(made.placement[:3, :3], compute_uv=False)[-1]
-        self._write(self._object_buffer, self._rows[index : index + 1], index * self._rows.itemsize)
+        self._objects[index].placement = placement(transform)
+        self._write_row(index)
 
     def move(self, name: str, matrices: ArrayLike) -> None:
         """The parts of a name are moved from where they stand at rest, in the space that holds them.
